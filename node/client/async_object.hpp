@@ -73,8 +73,6 @@ class CompleteOnce {
   }
   /// `what` is done where the operation is cancelled.
   void on_cancelled(std::function<void()> what) const { state_->cancelled = std::move(what); }
-  /// Whether the handler was called: what comes now comes too late.
-  bool is_over() const { return !state_->handler; }
   template <class... Results>
   void finish(std::exception_ptr failure, Results... results) const {
     if (!state_->handler) return;
@@ -98,7 +96,7 @@ class CompleteOnce {
   };
   explicit CompleteOnce(std::shared_ptr<State> state) : state_(std::move(state)) {}
   void cancel() const {
-    if (is_over()) return;
+    if (!state_->handler) return;
     if (state_->cancelled) state_->cancelled();
     fail(make_error(ErrorCode::operation_cancelled, "was cancelled"));
   }
@@ -106,32 +104,19 @@ class CompleteOnce {
   std::shared_ptr<State> state_;
 };
 
-// What ends what a request has begun, where its result comes too late.
-inline auto end_wire(std::string wire) {
-  return [wire = std::move(wire)](ClientConnection& connection, const std::string& path, const Value&) {
-    connection.disconnect_wire(path, wire, nullptr);
-  };
-}
-inline auto end_pipe(std::string pipe) {
-  return [pipe = std::move(pipe)](ClientConnection& connection, const std::string& path, const Value& index) {
-    connection.disconnect_pipe(path, pipe, index.to<std::int32_t>().value(), nullptr);
-  };
-}
-inline auto end_generator(std::string function) {
-  return [function = std::move(function)](ClientConnection& connection, const std::string& path, const Value& index) {
-    connection.close_generator(path, function, index.to<std::int32_t>().value(), nullptr);
-  };
-}
-
-/// `complete` as long as the operation is not over; a result that comes later is ended by `end`.
-template <class Complete, class End>
-ClientConnection::Completion complete_or_end(Complete complete, std::shared_ptr<ClientConnection> connection,
-                                             std::string path, End end, std::function<bool()> is_over) {
-  return [complete = std::move(complete), connection = std::move(connection), path = std::move(path),
-          end = std::move(end), is_over = std::move(is_over)](Result<Value> result) {
-    if (!is_over()) return complete(std::move(result));
-    if (result && !connection->is_closed()) end(*connection, path, *result);
-  };
+/// Begins a request by `start()`. One that returns its id is cancelled with the operation: its session ends what the
+/// service has begun for it.
+template <class Complete, class Start>
+void start_request(const Complete& complete, const std::shared_ptr<ClientConnection>& connection, Start&& start) {
+  if constexpr (std::is_void_v<decltype(start())>) {
+    start();
+  } else {
+    std::weak_ptr weak(connection);  // what completes at once may let go of whoever asked, and of `connection`
+    const RequestId id = start();
+    complete.on_cancelled([weak = std::move(weak), id] {
+      if (const auto still_there = weak.lock()) still_there->cancel(id);
+    });
+  }
 }
 
 }  // namespace detail
@@ -190,8 +175,7 @@ class AsyncObject {
   /// `received` gets each newer InValue until disconnect_wire().
   template <class Token = boost::asio::use_awaitable_t<>>
   auto connect_wire(std::string_view wire, ClientConnection::WireHandler received, Token&& token = {}) const {
-    return request_and_end<&ClientConnection::connect_wire>(detail::end_wire(std::string(wire)), token,
-                                                            std::string(wire), std::move(received));
+    return request<&ClientConnection::connect_wire>(token, std::string(wire), std::move(received));
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto disconnect_wire(std::string_view wire, Token&& token = {}) const {
@@ -205,8 +189,7 @@ class AsyncObject {
   template <class Token = boost::asio::use_awaitable_t<>>
   auto connect_pipe(std::string_view pipe, ClientConnection::PipeHandlers handlers, std::int32_t index = any_pipe_index,
                     Token&& token = {}) const {
-    return request_and_end<&ClientConnection::connect_pipe>(detail::end_pipe(std::string(pipe)), token,
-                                                            std::string(pipe), index, std::move(handlers));
+    return request<&ClientConnection::connect_pipe>(token, std::string(pipe), index, std::move(handlers));
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto disconnect_pipe(std::string_view pipe, std::int32_t index, Token&& token = {}) const {
@@ -219,8 +202,7 @@ class AsyncObject {
   /// Calls a generator function; completes with the generator's index as int32, which the three below take.
   template <class Token = boost::asio::use_awaitable_t<>>
   auto open_generator(std::string_view function, std::vector<Value> arguments = {}, Token&& token = {}) const {
-    return request_and_end<&ClientConnection::open_generator>(detail::end_generator(std::string(function)), token,
-                                                              std::string(function), std::move(arguments));
+    return request<&ClientConnection::open_generator>(token, std::string(function), std::move(arguments));
   }
   /// Completes with the next value; behind the last one a ClientException with stop_iteration.
   template <class Token = boost::asio::use_awaitable_t<>>
@@ -275,10 +257,7 @@ class AsyncObject {
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto lock(LockKind kind = LockKind::user, Token&& token = {}) const {
-    const auto end = [](ClientConnection& connection, const std::string& path, const Value&) {
-      connection.unlock(path, nullptr);
-    };
-    return request_and_end<&ClientConnection::lock>(end, token, kind);
+    return request<&ClientConnection::lock>(token, kind);
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto unlock(Token&& token = {}) const {
@@ -287,10 +266,7 @@ class AsyncObject {
   /// `timeout` negative: for ever.
   template <class Token = boost::asio::use_awaitable_t<>>
   auto enter_monitor(std::chrono::milliseconds timeout = std::chrono::milliseconds(-1), Token&& token = {}) const {
-    const auto end = [](ClientConnection& connection, const std::string& path, const Value&) {
-      connection.exit_monitor(path, nullptr);
-    };
-    return request_and_end<&ClientConnection::enter_monitor>(end, token, timeout);
+    return request<&ClientConnection::enter_monitor>(token, timeout);
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto exit_monitor(Token&& token = {}) const {
@@ -311,20 +287,8 @@ class AsyncObject {
     return boost::asio::async_initiate<Token, void(std::exception_ptr, Value)>(
         [connection = connection_, path = path_, ... rest = std::move(arguments)](auto handler) mutable {
           const detail::CompleteOnce<Value, decltype(handler)> complete(std::move(handler), connection->executor());
-          ((*connection).*Request)(path, std::move(rest)..., complete);
-        },
-        token);
-  }
-  /// The same for what lasts: `end(connection, path, result)` ends it where it comes after the request was cancelled.
-  template <auto Request, class End, class Token, class... Args>
-  auto request_and_end(End end, Token& token, Args... arguments) const {
-    return boost::asio::async_initiate<Token, void(std::exception_ptr, Value)>(
-        [connection = connection_, path = path_, end = std::move(end),
-         ... rest = std::move(arguments)](auto handler) mutable {
-          const detail::CompleteOnce<Value, decltype(handler)> complete(std::move(handler), connection->executor());
-          ((*connection).*Request)(path, std::move(rest)...,
-                                   detail::complete_or_end(complete, connection, path, std::move(end),
-                                                           [complete] { return complete.is_over(); }));
+          detail::start_request(complete, connection,
+                                [&] { return ((*connection).*Request)(path, std::move(rest)..., complete); });
         },
         token);
   }

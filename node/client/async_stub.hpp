@@ -56,12 +56,12 @@ class AsyncClientStub {
   AsyncObject rr_object;
 
   /// For handles of members: `start(connection, path, completion)` begins a request, `convert` makes a T of what it
-  /// completes with: a Value, or the Result<Value> where it takes that. `end` as in AsyncObject, or null.
-  template <class T, class Token, class Start, class Convert, class End = std::nullptr_t>
-  auto rr_request(Token& token, Start start, Convert convert, End end = {}) const {
+  /// completes with: a Value, or the Result<Value> where it takes that.
+  template <class T, class Token, class Start, class Convert>
+  auto rr_request(Token& token, Start start, Convert convert) const {
     return boost::asio::async_initiate<Token, typename detail::CompletionOf<T>::Signature>(
-        [object = rr_object, throw_declared = throw_declared_, start = std::move(start), convert = std::move(convert),
-         end = std::move(end)](auto handler) mutable {
+        [object = rr_object, throw_declared = throw_declared_, start = std::move(start),
+         convert = std::move(convert)](auto handler) mutable {
           using Complete = detail::CompleteOnce<T, decltype(handler)>;
           const Complete complete(std::move(handler), object.connection()->executor());
           auto completed = [complete, throw_declared, convert = std::move(convert)](Result<Value> result) {
@@ -78,12 +78,8 @@ class AsyncClientStub {
             };
             finish<T>(complete, value);
           };
-          if constexpr (std::is_null_pointer_v<End>)
-            start(*object.connection(), object.path(), std::move(completed));
-          else
-            start(*object.connection(), object.path(),
-                  detail::complete_or_end(std::move(completed), object.connection(), object.path(), std::move(end),
-                                          [complete] { return complete.is_over(); }));
+          detail::start_request(complete, object.connection(),
+                                [&] { return start(*object.connection(), object.path(), std::move(completed)); });
         },
         token);
   }
@@ -109,12 +105,11 @@ class AsyncClientStub {
         token,
         [function, values = detail::pack_arguments(arguments...)](ClientConnection& connection, const std::string& path,
                                                                   ClientConnection::Completion done) {
-          connection.open_generator(path, function, values, std::move(done));
+          return connection.open_generator(path, function, values, std::move(done));
         },
         [client = *this, function](const Value& index) {
           return AsyncGenerator<T, Parameter>(client, function, index.to<std::int32_t>().value());
-        },
-        detail::end_generator(function));
+        });
   }
   template <class Client, class Token, class... Index>
   auto rr_child(const char* objref, Token& token, const Index&... index) const {
@@ -241,9 +236,9 @@ class AsyncWire : public AsyncMember {
         token,
         [name = name(), handler = std::move(handler)](ClientConnection& connection, const std::string& path,
                                                       ClientConnection::Completion done) mutable {
-          connection.connect_wire(path, name, std::move(handler), std::move(done));
+          return connection.connect_wire(path, name, std::move(handler), std::move(done));
         },
-        [](const Value&) {}, detail::end_wire(name()));
+        [](const Value&) {});
   }
 };
 
@@ -315,12 +310,11 @@ class AsyncPipe : public AsyncMember {
           ClientConnection::PipeHandlers handlers;
           handlers.received = received;
           handlers.closed = [is_open] { *is_open = false; };
-          connection.connect_pipe(path, name, any_pipe_index, std::move(handlers), std::move(done));
+          return connection.connect_pipe(path, name, any_pipe_index, std::move(handlers), std::move(done));
         },
         [object = object(), name = name(), is_open](const Value& index) {
           return Endpoint(object, name, index.to<std::int32_t>().value(), is_open);
-        },
-        detail::end_pipe(name()));
+        });
   }
 };
 

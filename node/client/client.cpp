@@ -1,6 +1,7 @@
 #include "node/client/client.hpp"
 
 #include "core/session/service_path.hpp"
+#include "core/types/value_size.hpp"
 
 namespace rr {
 
@@ -11,6 +12,13 @@ constexpr std::size_t room_for_packets = 1024 * 1024;
 constexpr std::chrono::seconds wait_for_room{15};
 
 constexpr std::size_t max_waiting_handlers = 65'536;
+constexpr std::size_t max_waiting_bytes = 64 * 1024 * 1024;
+
+std::size_t bytes_of_values(std::span<const Value> values) {
+  std::size_t bytes = 0;
+  for (const auto& value : values) bytes += held_bytes(value);
+  return bytes;
+}
 
 /// Marks that the io_context runs; refuses to run it from within itself.
 class Serving {
@@ -38,15 +46,16 @@ Value password_credentials(std::string_view password) {
 BlockingConnection::BlockingConnection(std::string_view url, ConnectOptions options) {
   std::optional<Error> failure;
   ClientConnection::open(io_, url, std::move(options), [&](Result<std::shared_ptr<ClientConnection>> opened) {
-    if (opened)
+    if (opened) {
       connection_ = std::move(*opened);
-    else
+      connection_->on_closed([this](const Error& reason) { close_reason_ = reason; });
+    } else {
       failure = opened.error();
+    }
   });
   while (!connection_ && !failure && io_.run_one() != 0) {
   }
   if (failure) throw ClientException(*failure);
-  connection_->on_closed([this](const Error& reason) { close_reason_ = reason; });
 }
 
 BlockingConnection::~BlockingConnection() {
@@ -64,33 +73,44 @@ bool BlockingConnection::serve(std::optional<std::chrono::steady_clock::time_poi
 }
 
 void BlockingConnection::queue(HandlerCall handler) {
-  if (handlers_.size() < max_waiting_handlers) return handlers_.push_back(std::move(handler));
+  // One alone may be larger.
+  if (handlers_.size() < max_waiting_handlers &&
+      (handlers_.empty() || waiting_bytes_ + handler.bytes <= max_waiting_bytes)) {
+    waiting_bytes_ += handler.bytes;
+    return handlers_.push_back(std::move(handler));
+  }
   connection_->close(make_error(ErrorCode::out_of_system_resource,
-                                std::to_string(max_waiting_handlers) + " calls of handlers wait: they take too long"));
+                                std::to_string(handlers_.size()) + " calls of handlers wait, with " +
+                                    std::to_string(waiting_bytes_) + " bytes: they take too long; expected at most " +
+                                    std::to_string(max_waiting_handlers) + " calls, with " +
+                                    std::to_string(max_waiting_bytes) + " bytes"));
 }
 
-void BlockingConnection::run_handlers() {
+void BlockingConnection::run_handlers(std::chrono::steady_clock::time_point until) {
   if (is_handling_) return;
   is_handling_ = true;
-  while (!handlers_.empty()) {
+  for (auto left = handlers_.size(); left > 0; --left) {
     const auto next = std::move(handlers_.front());
     handlers_.pop_front();
+    waiting_bytes_ -= next.bytes;
     try {
       next.call();
     } catch (...) {
       connection_->handler_failed(next.kind, next.name);
     }
+    if (std::chrono::steady_clock::now() >= until) break;
   }
   is_handling_ = false;
 }
 
 bool BlockingConnection::run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
-  run_handlers();
+  run_handlers(deadline);
   while (!is_done()) {
-    const bool was_served = serve(deadline);
-    run_handlers();
-    if (!was_served && (is_closed() || std::chrono::steady_clock::now() >= deadline)) return is_done();
+    // What the peer sends is not read while handlers wait: it is the peer that waits for them.
+    const bool goes_on = has_handlers() || serve(deadline);
+    run_handlers(deadline);
+    if (std::chrono::steady_clock::now() >= deadline || (!goes_on && is_closed())) return is_done();
   }
   return true;
 }
@@ -103,7 +123,7 @@ Value BlockingConnection::wait_for_completion(
     const Serving serving(is_serving_);
     start(*connection_, [&](Result<Value>&& completed) { result = std::move(completed); });
   }
-  while (!result && serve({})) run_handlers();
+  while (!result && (has_handlers() || serve({}))) run_handlers();
   run_handlers();  // of what came before the answer
   if (!result) throw ClientException(make_error(ErrorCode::connection_error, "the connection is gone"));
   if (!*result) throw ClientException(result->error());
@@ -232,9 +252,12 @@ RemotePipe RemoteObject::connect_pipe(std::string_view pipe, std::function<void(
   if (received)
     handlers.received = [connection = connection_.get(), state = endpoint.state_, name = std::string(pipe),
                          handler = std::make_shared<std::function<void(Value)>>(std::move(received))](Value packet) {
-      connection->queue({"pipe", name, [state, handler, packet = std::move(packet)] {
+      const auto bytes = held_bytes(packet);
+      connection->queue({"pipe", name,
+                         [state, handler, packet = std::move(packet)] {
                            if (!state->is_closed_here) (*handler)(packet);
-                         }});
+                         },
+                         bytes});
     };
   const Value connected = connection_->wait_for([&](ClientConnection& connection, auto done) {
     connection.connect_pipe(path_, pipe, index, std::move(handlers), std::move(done));
@@ -268,7 +291,8 @@ void RemoteObject::on_callback_values(std::string_view callback, ClientConnectio
   auto called = [connection = connection_.get(), name = std::string(callback),
                  handler = std::make_shared<ClientConnection::CallbackHandler>(std::move(handler))](
                     std::span<const Value> arguments, const ClientConnection::CallbackReply& reply) {
-    connection->queue({"callback", name, [handler, values = std::vector(arguments.begin(), arguments.end()), reply] {
+    connection->queue({"callback", name,
+                       [handler, values = std::vector(arguments.begin(), arguments.end()), reply] {
                          try {
                            reply((*handler)(values));
                          } catch (...) {
@@ -276,7 +300,8 @@ void RemoteObject::on_callback_values(std::string_view callback, ClientConnectio
                            reply(error);
                            if (is_unhandled(error)) throw;
                          }
-                       }});
+                       },
+                       bytes_of_values(arguments)});
   };
   connection_->asynchronous().on_callback_later(path_, callback, std::move(called));
 }
@@ -286,9 +311,11 @@ HandlerRegistration RemoteObject::on_event(std::string_view event, ClientConnect
   auto received = [connection = connection_.get(), is_removed, name = std::string(event),
                    handler = std::make_shared<ClientConnection::EventHandler>(std::move(handler))](
                       std::span<const Value> arguments) {
-    connection->queue({"event", name, [is_removed, handler, values = std::vector(arguments.begin(), arguments.end())] {
+    connection->queue({"event", name,
+                       [is_removed, handler, values = std::vector(arguments.begin(), arguments.end())] {
                          if (!*is_removed) (*handler)(values);
-                       }});
+                       },
+                       bytes_of_values(arguments)});
   };
   return connection_->asynchronous().add_event_handler(path_, event, std::move(received), is_removed);
 }

@@ -35,8 +35,8 @@ class ClientException : public Exception {
 /// A connection and the io_context that it runs on, which runs only while one of the functions here waits: handlers of
 /// events, wires, pipes and callbacks are called then, on the thread that waits, one after another in the order of what
 /// they tell of. A handler may make requests and wait for them; the others are called when it has returned. What waits
-/// for handlers that take too long: of a wire the newest value, of the rest up to 65,536 calls, above which the
-/// connection is closed. For one thread.
+/// for handlers that take too long: of a wire the newest value, of the rest up to 65,536 calls and 64 MiB, above which
+/// the connection is closed. For one thread.
 class BlockingConnection {
  public:
   /// Throws   ClientException.
@@ -46,7 +46,8 @@ class BlockingConnection {
   BlockingConnection(const BlockingConnection&) = delete;
   BlockingConnection& operator=(const BlockingConnection&) = delete;
 
-  /// Calls handlers for a time, or until `is_done()`. Returns whether it is done.
+  /// Calls handlers for a time, or until `is_done()`. Returns whether it is done. A handler that runs at the end of the
+  /// time is waited for; those behind it are called by whoever waits next.
   void run_for(std::chrono::milliseconds duration);
   bool run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout);
   /// Starts a request and waits for its completion. Throws ClientException.
@@ -70,12 +71,16 @@ class BlockingConnection {
     const char* kind;
     std::string name;
     std::function<void()> call;
+    std::size_t bytes = 0;  ///< of the values that it holds; not of a wire's, of which there is one
   };
 
   Value wait_for_completion(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
   /// Has a handler called by whoever waits here.
   void queue(HandlerCall handler);
-  void run_handlers();
+  /// Calls those that wait now, but none after `until`, except for the first. What comes while they run, which handlers
+  /// that wait themselves let in, is for the next time: it might never end.
+  void run_handlers(std::chrono::steady_clock::time_point until = std::chrono::steady_clock::time_point::max());
+  bool has_handlers() const { return !handlers_.empty() && !is_handling_; }
   /// Handles what comes next. Returns whether there was anything before `until`.
   bool serve(std::optional<std::chrono::steady_clock::time_point> until);
 
@@ -83,7 +88,8 @@ class BlockingConnection {
   std::shared_ptr<ClientConnection> connection_;
   std::optional<Error> close_reason_;
   std::deque<HandlerCall> handlers_;
-  bool is_handling_ = false;  ///< one of them runs
+  std::size_t waiting_bytes_ = 0;  ///< of handlers_
+  bool is_handling_ = false;       ///< one of them runs
   bool is_serving_ = false;
   /// For each connected wire, whether it was disconnected since.
   std::map<std::pair<std::string, std::string>, std::shared_ptr<bool>> wires_;

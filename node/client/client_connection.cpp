@@ -100,11 +100,24 @@ std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std:
 }
 
 template <class Ask>
-void ClientConnection::expect(Ask&& ask, Completion done) {
+RequestId ClientConnection::expect(Ask&& ask, Completion done) {
   const Now now = read_clocks();
   const RequestId id = ask(now);
   spare_completion_.insert(completions_, id, std::move(done));
   settle(now);
+  return id;
+}
+
+void ClientConnection::cancel(RequestId id) {
+  // One whose answer is about to be handled completes with that.
+  if (!session_.has_request(id)) return;
+  const auto self = shared_from_this();
+  auto found = completions_.extract(id);
+  session_.cancel(id);
+  settle();
+  if (found && found.mapped())
+    run_handler("request to", session_.service(),
+                [&] { found.mapped()(make_error(ErrorCode::operation_cancelled, "was cancelled")); });
 }
 
 void ClientConnection::call(std::string_view path, std::string_view function, std::span<const Value> arguments,
@@ -112,9 +125,9 @@ void ClientConnection::call(std::string_view path, std::string_view function, st
   expect([&](Now now) { return session_.call_function(path, function, arguments, now); }, std::move(done));
 }
 
-void ClientConnection::open_generator(std::string_view path, std::string_view function,
-                                      std::span<const Value> arguments, Completion done) {
-  expect([&](Now now) { return session_.open_generator(path, function, arguments, now); }, std::move(done));
+RequestId ClientConnection::open_generator(std::string_view path, std::string_view function,
+                                           std::span<const Value> arguments, Completion done) {
+  return expect([&](Now now) { return session_.open_generator(path, function, arguments, now); }, std::move(done));
 }
 
 void ClientConnection::next_generator(std::string_view path, std::string_view function, std::int32_t index,
@@ -171,10 +184,29 @@ void ClientConnection::poke_out(std::string_view path, std::string_view wire, co
   expect([&](Now now) { return session_.poke_out_value(path, wire, value, now); }, std::move(done));
 }
 
-void ClientConnection::connect_wire(std::string_view path, std::string_view wire, WireHandler handler,
-                                    Completion done) {
-  wire_handlers_[{std::string(path), std::string(wire)}] = std::make_shared<WireHandler>(std::move(handler));
-  expect([&](Now now) { return session_.connect_wire(path, wire, now); }, std::move(done));
+RequestId ClientConnection::connect_wire(std::string_view path, std::string_view wire, WireHandler handler,
+                                         Completion done) {
+  const MemberKey key{std::string(path), std::string(wire)};
+  const auto mine = std::make_shared<WireSubscription>(WireSubscription{std::move(handler)});
+  if (!end_) wire_handlers_[key] = mine;
+  auto connected = [this, key, mine, done = std::move(done)](Result<Value> result) {
+    if (!result) forget_wire(key, *mine);
+    if (done) done(std::move(result));
+  };
+  mine->connect = expect([&](Now now) { return session_.connect_wire(path, wire, now); }, std::move(connected));
+  return mine->connect;
+}
+
+void ClientConnection::forget_wire(const MemberKey& key, const WireSubscription& wire) {
+  const auto found = wire_handlers_.find(key);
+  if (found == wire_handlers_.end() || found->second.get() != &wire) return;
+  wire_handlers_.erase(found);
+  wire_closed_handlers_.erase(key);
+}
+
+void ClientConnection::end_wire(std::string_view path, std::string_view wire, RequestId connect) {
+  const auto found = wire_handlers_.find(MemberKey(path, wire));
+  if (found != wire_handlers_.end() && found->second->connect == connect) disconnect_wire(path, wire, nullptr);
 }
 
 void ClientConnection::disconnect_wire(std::string_view path, std::string_view wire, Completion done) {
@@ -185,7 +217,7 @@ void ClientConnection::disconnect_wire(std::string_view path, std::string_view w
 }
 
 void ClientConnection::on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler) {
-  wire_closed_handlers_[{std::string(path), std::string(wire)}] = std::move(handler);
+  if (!end_) wire_closed_handlers_[{std::string(path), std::string(wire)}] = std::move(handler);
 }
 
 Result<> ClientConnection::send_wire(std::string_view path, std::string_view wire, const Value& value) {
@@ -194,8 +226,8 @@ Result<> ClientConnection::send_wire(std::string_view path, std::string_view wir
   return sent;
 }
 
-void ClientConnection::connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
-                                    PipeHandlers handlers, Completion done) {
+RequestId ClientConnection::connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                         PipeHandlers handlers, Completion done) {
   // Packets follow right behind the completion: only there the index is known.
   auto connected = [this, path = std::string(path), pipe = std::string(pipe),
                     handlers = std::make_shared<PipeHandlers>(std::move(handlers)),
@@ -203,7 +235,7 @@ void ClientConnection::connect_pipe(std::string_view path, std::string_view pipe
     if (result) pipe_handlers_[{path, pipe, result->to<std::int32_t>().value()}] = handlers;
     if (done) done(std::move(result));
   };
-  expect([&](Now now) { return session_.connect_pipe(path, pipe, index, now); }, std::move(connected));
+  return expect([&](Now now) { return session_.connect_pipe(path, pipe, index, now); }, std::move(connected));
 }
 
 void ClientConnection::disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
@@ -241,6 +273,7 @@ void ClientConnection::on_callback(std::string_view path, std::string_view callb
 
 void ClientConnection::on_callback_later(std::string_view path, std::string_view callback,
                                          LateCallbackHandler handler) {
+  if (end_) return;
   callback_handlers_[{std::string(path), std::string(callback)}] =
       std::make_shared<LateCallbackHandler>(std::move(handler));
 }
@@ -254,6 +287,7 @@ HandlerRegistration ClientConnection::add_event_handler(std::string_view path, s
   HandlerRegistration registration;
   registration.connection_ = std::static_pointer_cast<ClientConnection>(shared_from_this());
   registration.is_removed_ = is_removed;
+  if (end_) return registration;
   event_handlers_.emplace(MemberKey(path, event), std::make_shared<EventSubscription>(
                                                       EventSubscription{std::move(handler), std::move(is_removed)}));
   return registration;
@@ -283,16 +317,16 @@ void ClientConnection::get_attributes(Completion done) {
   expect([&](Now now) { return session_.get_attributes(now); }, std::move(done));
 }
 
-void ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
-  expect([&](Now now) { return session_.lock(path, kind, now); }, std::move(done));
+RequestId ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
+  return expect([&](Now now) { return session_.lock(path, kind, now); }, std::move(done));
 }
 
 void ClientConnection::unlock(std::string_view path, Completion done) {
   expect([&](Now now) { return session_.unlock(path, now); }, std::move(done));
 }
 
-void ClientConnection::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done) {
-  expect([&](Now now) { return session_.enter_monitor(path, timeout, now); }, std::move(done));
+RequestId ClientConnection::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done) {
+  return expect([&](Now now) { return session_.enter_monitor(path, timeout, now); }, std::move(done));
 }
 
 void ClientConnection::lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman,
@@ -302,6 +336,17 @@ void ClientConnection::lease(std::string_view path, LeaseCommand command, std::c
 
 void ClientConnection::exit_monitor(std::string_view path, Completion done) {
   expect([&](Now now) { return session_.exit_monitor(path, now); }, std::move(done));
+}
+
+void ClientConnection::on_path_released(std::function<void(const std::string& path)> handler) {
+  if (!end_) path_released_ = std::move(handler);
+}
+
+void ClientConnection::on_closed(std::function<void(const Error& reason)> handler) {
+  if (!end_) return on_closed_.push_back(std::move(handler));
+  post([this, self = shared_from_this(), handler = std::move(handler)] {
+    if (handler) run_handler("the end of", session_.service(), [&] { handler(*end_); });
+  });
 }
 
 void ClientConnection::disconnect() {
@@ -363,8 +408,8 @@ void ClientConnection::handle(WireValueReceived&& received) {
   const auto found = wire_handlers_.find(key);
   if (found == wire_handlers_.end()) return;
   const auto handler = found->second;
-  if (!*handler) return;  // connected to send alone
-  run_handler("wire", key.second, [&] { (*handler)(received.value, received.time); });
+  if (!handler->handler) return;  // connected to send alone
+  run_handler("wire", key.second, [&] { handler->handler(received.value, received.time); });
 }
 
 void ClientConnection::handle(WireClosedByService&& closed) {
@@ -431,6 +476,7 @@ void ClientConnection::handle(PathReleased&& released) {
 }
 
 void ClientConnection::handle(SessionClosed&& closed) {
+  end_ = closed.reason;
   event_handlers_.clear();
   wire_handlers_.clear();
   wire_closed_handlers_.clear();

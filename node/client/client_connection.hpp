@@ -100,8 +100,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   const std::string& root_path() const { return session_.service(); }
   void call(std::string_view path, std::string_view function, std::span<const Value> arguments, Completion done);
   /// Completes with the generator's index, for the others; next with the error stop_iteration after the last value.
-  void open_generator(std::string_view path, std::string_view function, std::span<const Value> arguments,
-                      Completion done);
+  RequestId open_generator(std::string_view path, std::string_view function, std::span<const Value> arguments,
+                           Completion done);
   void next_generator(std::string_view path, std::string_view function, std::int32_t index,
                       const std::optional<Value>& parameter, Completion done);
   void close_generator(std::string_view path, std::string_view function, std::int32_t index, Completion done);
@@ -116,8 +116,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void peek_in(std::string_view path, std::string_view wire, Completion done);
   void peek_out(std::string_view path, std::string_view wire, Completion done);
   void poke_out(std::string_view path, std::string_view wire, const Value& value, Completion done);
-  /// `handler` gets each InValue that is newer than the one before, until disconnect_wire().
-  void connect_wire(std::string_view path, std::string_view wire, WireHandler handler, Completion done);
+  /// `handler` gets each InValue that is newer than the one before, until disconnect_wire(). One handler a wire.
+  RequestId connect_wire(std::string_view path, std::string_view wire, WireHandler handler, Completion done);
+  /// Disconnects the wire unless connect_wire() has been called for it since the call that returned `connect`.
+  void end_wire(std::string_view path, std::string_view wire, RequestId connect);
   void disconnect_wire(std::string_view path, std::string_view wire, Completion done);
   /// `handler` hears that the service has closed the wire, or released its object; not of disconnect_wire() and the
   /// session's end. One handler a wire.
@@ -127,8 +129,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// Drops a value that send_wire() keeps because much waits for the stream.
   void drop_waiting_value(std::string_view path, std::string_view wire) { session_.drop_waiting_value(path, wire); }
   /// Completes with the index of the endpoint, which may be another than the one asked for. Packets follow.
-  void connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, PipeHandlers handlers,
-                    Completion done);
+  RequestId connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, PipeHandlers handlers,
+                         Completion done);
   void disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, Completion done);
   /// Errors   the endpoint is not connected; out_of_system_resource: too much waits for the stream, nothing was sent
   ///          (see ClientSession::queued_bytes()); those of packing.
@@ -138,6 +140,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
                                           const Value& packet);
   /// See ClientSession.
   void hold_pipe_acks(std::string_view path, std::string_view pipe, std::int32_t index, bool is_held);
+  /// Completes a request with operation_cancelled at once; see ClientSession. Unknown ids, and those of requests that
+  /// are answered, are ignored.
+  void cancel(RequestId id);
   // Session operations; see ClientSession.
   void authenticate(std::string_view username, const Value& credentials, Completion done);
   void logout(Completion done);
@@ -147,9 +152,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman, Completion done);
   /// See ClientSession::set_urgent().
   void set_urgent(bool is_urgent) { session_.set_urgent(is_urgent); }
-  void lock(std::string_view path, LockKind kind, Completion done);
+  RequestId lock(std::string_view path, LockKind kind, Completion done);
   void unlock(std::string_view path, Completion done);
-  void enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);
+  RequestId enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);
   void exit_monitor(std::string_view path, Completion done);
   /// What the service gets when it calls: a value, null for void callbacks, or an error; an exception reaches it as
   /// one. One handler a callback; a second replaces the first.
@@ -168,10 +173,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// In a catch block: reports what a handler has thrown.
   void handler_failed(std::string_view kind, std::string_view name) const;
   /// `handler` hears that the service has replaced the objects at and below a path; its other handlers there are gone.
-  void on_path_released(std::function<void(const std::string& path)> handler) { path_released_ = std::move(handler); }
-  /// Called once, when the session has ended for whatever reason; not after a failed open(). Each handler that is
-  /// given.
-  void on_closed(std::function<void(const Error& reason)> handler) { on_closed_.push_back(std::move(handler)); }
+  void on_path_released(std::function<void(const std::string& path)> handler);
+  /// Called once, when the session has ended for whatever reason, or soon where it has ended already; not after a
+  /// failed open(). Each handler that is given.
+  void on_closed(std::function<void(const Error& reason)> handler);
   /// Tells the service, then closes; on_closed follows.
   void disconnect();
 
@@ -199,9 +204,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(CallbackCalled&& called);
   void handle(PathReleased&& released);
   void handle(SessionClosed&& closed);
-  /// Asks the session by `ask(now)`, whose request completes with `done`.
+  /// Asks the session by `ask(now)`, whose request completes with `done`. Returns the request.
   template <class Ask>
-  void expect(Ask&& ask, Completion done);
+  RequestId expect(Ask&& ask, Completion done);
   /// Runs a handler; what it throws is reported.
   template <class F>
   void run_handler(std::string_view kind, std::string_view name, F&& handler);
@@ -216,13 +221,21 @@ class ClientConnection final : public SessionDriver<ClientSession> {
     EventHandler handler;
     std::shared_ptr<bool> is_removed;
   };
+  struct WireSubscription {
+    WireHandler handler;
+    RequestId connect = 0;  ///< 0 until the request is made
+  };
+  void forget_wire(const MemberKey& key, const WireSubscription& wire);
+
+  // None of these is kept once the session has ended: it might be what keeps this connection.
   std::multimap<MemberKey, std::shared_ptr<EventSubscription>> event_handlers_;
-  std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
+  std::map<MemberKey, std::shared_ptr<WireSubscription>> wire_handlers_;
   std::map<MemberKey, std::function<void()>> wire_closed_handlers_;
   std::map<MemberKey, std::shared_ptr<LateCallbackHandler>> callback_handlers_;
   std::function<void(const std::string& path)> path_released_;
   std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
   std::vector<std::function<void(const Error&)>> on_closed_;
+  std::optional<Error> end_;  ///< why the session has ended
 };
 
 }  // namespace rr

@@ -100,19 +100,21 @@ void MemberFollower::begin(PlaceId id) {
 void MemberFollower::connect_member(PlaceId id) {
   const auto found = places_.find(id);
   if (found == places_.end()) return;
-  auto connected = [self = shared_from_this(), id, root = found->second.root,
-                    path = found->second.path](const Result<Value>& result) {
+  const auto request = std::make_shared<RequestId>(0);
+  auto connected = [self = shared_from_this(), id, root = found->second.root, path = found->second.path,
+                    request](const Result<Value>& result) {
     if (!result) return self->handle_failed(id, result.error());
     const std::int32_t index = result->is_null() ? 0 : result->to<std::int32_t>().value();
     const auto place = self->places_.find(id);
     if (place == self->places_.end()) {
       if (root.connection()->is_closed()) return;
-      return self->disconnect(Place{root, path, index, true});
+      return self->disconnect(Place{root, path, index, *request, true});
     }
     place->second.index = index;
     place->second.is_connected = true;
   };
-  connect(id, found->second, std::move(connected));
+  *request = connect(id, found->second, std::move(connected));
+  if (const auto place = places_.find(id); place != places_.end()) place->second.request = *request;
 }
 
 void MemberFollower::handle_closed(PlaceId id) {
@@ -144,7 +146,7 @@ void MemberFollower::handle_received(PlaceId id, Value value, TimeSpec time) {
 
 // --- wires ---
 
-void WireFollower::connect(PlaceId id, const Place& place, ClientConnection::Completion done) {
+RequestId WireFollower::connect(PlaceId id, const Place& place, ClientConnection::Completion done) {
   const auto weak = weak_of(*this);
   place.root.connection()->on_wire_closed(place.path, member(), [weak, id] {
     if (const auto self = weak.lock()) self->handle_closed(id);
@@ -152,11 +154,12 @@ void WireFollower::connect(PlaceId id, const Place& place, ClientConnection::Com
   auto received_value = [weak, id](const Value& value, TimeSpec time) {
     if (const auto self = weak.lock()) self->handle_received(id, value, time);
   };
-  place.root.connection()->connect_wire(place.path, member(), std::move(received_value), std::move(done));
+  return place.root.connection()->connect_wire(place.path, member(), std::move(received_value), std::move(done));
 }
 
 void WireFollower::disconnect(const Place& place) {
-  place.root.connection()->disconnect_wire(place.path, member(), nullptr);
+  // Another subscription may have connected it since.
+  place.root.connection()->end_wire(place.path, member(), place.request);
 }
 
 Result<> WireFollower::send_to(const Place& place, const Value& value) {
@@ -171,7 +174,7 @@ void WireFollower::keep(std::deque<ReceivedValue>&, ReceivedValue value) {
 
 // --- pipes ---
 
-void PipeFollower::connect(PlaceId id, const Place& place, ClientConnection::Completion done) {
+RequestId PipeFollower::connect(PlaceId id, const Place& place, ClientConnection::Completion done) {
   const auto weak = weak_of(*this);
   ClientConnection::PipeHandlers handlers;
   handlers.received = [weak, id](Value packet) {
@@ -180,7 +183,8 @@ void PipeFollower::connect(PlaceId id, const Place& place, ClientConnection::Com
   handlers.closed = [weak, id] {
     if (const auto self = weak.lock()) self->handle_closed(id);
   };
-  place.root.connection()->connect_pipe(place.path, member(), any_pipe_index, std::move(handlers), std::move(done));
+  return place.root.connection()->connect_pipe(place.path, member(), any_pipe_index, std::move(handlers),
+                                               std::move(done));
 }
 
 void PipeFollower::disconnect(const Place& place) {

@@ -60,12 +60,13 @@ class MemberFollower : public SubscriptionFollower, public std::enable_shared_fr
     AsyncObject root;
     std::string path;
     std::int32_t index = 0;  ///< of the pipe endpoint
+    RequestId request = 0;   ///< that has connected it
     bool is_connected = false;
     std::unique_ptr<boost::asio::steady_timer> retry = nullptr;
   };
   using PlaceId = std::uint64_t;
 
-  virtual void connect(PlaceId id, const Place& place, ClientConnection::Completion done) = 0;
+  virtual RequestId connect(PlaceId id, const Place& place, ClientConnection::Completion done) = 0;
   virtual void disconnect(const Place& place) = 0;
   virtual Result<> send_to(const Place& place, const Value& value) = 0;
   /// Keeps what nobody waits for; `queue` is what waits for the user.
@@ -98,7 +99,7 @@ class WireFollower final : public MemberFollower {
   std::optional<ReceivedValue> newest;
 
  private:
-  void connect(PlaceId id, const Place& place, ClientConnection::Completion done) override;
+  RequestId connect(PlaceId id, const Place& place, ClientConnection::Completion done) override;
   void disconnect(const Place& place) override;
   Result<> send_to(const Place& place, const Value& value) override;
   void keep(std::deque<ReceivedValue>& queue, ReceivedValue value) override;
@@ -111,7 +112,7 @@ class PipeFollower final : public MemberFollower {
   std::uint64_t dropped = 0;
 
  private:
-  void connect(PlaceId id, const Place& place, ClientConnection::Completion done) override;
+  RequestId connect(PlaceId id, const Place& place, ClientConnection::Completion done) override;
   void disconnect(const Place& place) override;
   Result<> send_to(const Place& place, const Value& value) override;
   void keep(std::deque<ReceivedValue>& queue, ReceivedValue value) override;

@@ -401,7 +401,8 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
       }
       done(std::move(index));
     };
-    return connection_->open_generator(path, name, called.arguments, std::move(opened));
+    connection_->open_generator(path, name, called.arguments, std::move(opened));
+    return;
   }
   const auto found = generators_.find(key);
   if (found == generators_.end()) {
@@ -442,13 +443,16 @@ void Upstream::ask_for_lock(rr::LockCommand command, const std::string& path, st
   if (!connection_) return done(lost_error());
   switch (command) {
     case rr::LockCommand::lock_for_user:
-      return connection_->lock(path, rr::LockKind::user, std::move(done));
+      connection_->lock(path, rr::LockKind::user, std::move(done));
+      return;
     case rr::LockCommand::lock_for_client:
-      return connection_->lock(path, rr::LockKind::client, std::move(done));
+      connection_->lock(path, rr::LockKind::client, std::move(done));
+      return;
     case rr::LockCommand::unlock:
       return connection_->unlock(path, std::move(done));
     case rr::LockCommand::enter_monitor:
-      return connection_->enter_monitor(path, timeout, std::move(done));
+      connection_->enter_monitor(path, timeout, std::move(done));
+      return;
     case rr::LockCommand::exit_monitor:
       return connection_->exit_monitor(path, std::move(done));
     default:

@@ -107,7 +107,7 @@ void ClientSession::scan_deadlines(Now now) {
     const auto member = found->second.member ? "'" + found->second.member->name + "'" : std::string("the service");
     auto error = make_error(ErrorCode::request_timeout, "no answer from " + member + " in time");
     if (found->second.is_abandoned) {
-      end_pipe_request(found->second);
+      if (found->second.member) end_pipe_request(found->second);
       pending_.erase(found);
       continue;
     }
@@ -187,7 +187,7 @@ RequestId ClientSession::request(EntryType type, MemberKind kind, std::string_vi
   if (auto written = write(**definition); !written) return fail_request(id, written.error());
   const bool is_urgent = is_urgent_ || (*definition)->has_modifier("urgent");
   if (auto sent = send_outgoing(now, is_urgent); !sent) return fail_request(id, sent.error());
-  const bool has_state = kind == MemberKind::wire || kind == MemberKind::pipe;
+  const bool has_state = kind == MemberKind::wire || kind == MemberKind::pipe || (*definition)->is_generator();
   add_pending(id, type, *definition, has_state ? path : std::string_view{}, now);
   return id;
 }
@@ -331,7 +331,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
     return handle_pipe_reply(message, entry, id, pending, now);
-  if (pending.is_abandoned) return disconnect_left_wire(entry, pending, now);
+  if (pending.is_abandoned) return end_late(message, entry, pending, now);
   if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req)

@@ -221,7 +221,9 @@ class ClientSession {
   /// error that says so. For a callback that nobody takes: invalid_operation, "Callback function not set". Unknown ids
   /// are ignored.
   void reply_callback(CallbackId id, const Result<Value>& result, Now now);
-  /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
+  /// Forgets a request: no event follows. Nothing is sent: the service still runs it. What its late reply brings (a
+  /// wire, a pipe endpoint, a generator, a lock, a monitor) is ended at once, as it is after request_timeout; a lock or
+  /// a monitor only if nothing else was asked about those of its object since.
   void cancel(RequestId id);
   /// How long requests from now on may take; those that wait already keep their deadline.
   void set_request_timeout(std::chrono::milliseconds timeout) { options_.request_timeout = timeout; }
@@ -250,6 +252,8 @@ class ClientSession {
   /// The type of an object that was looked up; nullptr if it was not. The root's path is the service name.
   const EntityDefinition* object_type(std::string_view path) const;
   std::size_t pending_requests() const { return pending_.size(); }
+  /// Whether a request waits for its answer.
+  bool has_request(RequestId id) const { return pending_.contains(id); }
   /// What waits for the stream: a sender of many pipe packets waits until this is small.
   std::size_t queued_bytes() const { return connection_.queued_bytes(); }
 
@@ -271,11 +275,12 @@ class ClientSession {
   struct Pending {
     EntryType type = EntryType::null;
     const MemberDefinition* member = nullptr;
-    std::string path;  ///< find_object, wires, pipes, session operations: calls, properties allocate nothing here
+    /// find_object, wires, pipes, generators, session operations: calls, properties allocate nothing here.
+    std::string path;
     TimePoint deadline;
-    std::int32_t pipe_index = 0;  ///< pipes only
-    bool is_abandoned = false;    ///< pipes and wires: nobody waits any more, but the reply must be acted on
-    GeneratorStep step = GeneratorStep::next;     ///< generator steps only
+    std::int32_t pipe_index = 0;               ///< pipes only
+    bool is_abandoned = false;                 ///< of what lasts: nobody waits any more, but the reply must be acted on
+    GeneratorStep step = GeneratorStep::next;  ///< generator steps only
     std::unique_ptr<MemoryTransfer> memory = {};  ///< memories only
     std::unique_ptr<Fetch> fetch = {};            ///< requests of definitions only
   };
@@ -363,7 +368,7 @@ class ClientSession {
   using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
   void release_wires(std::string_view path);
   Wires::iterator find_connecting_wire(const Pending& pending, RequestId id);
-  void disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now);
+  void end_late(const Message& message, const MessageEntry& entry, const Pending& pending, Now now);
   void handle_wire_connected(const Pending& pending, RequestId id);
   void handle_event(const Message& message, const MessageEntry& entry);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);

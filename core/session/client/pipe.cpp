@@ -163,15 +163,17 @@ void ClientSession::end_pipe_request(const Pending& pending) {
   if (pipe.endpoints.empty()) pipes_.erase(found);
 }
 
-/// A connect reply that comes later must close its endpoint, or its wire, again, a disconnect must free its index: the
-/// request stays, though nobody waits for it. Returns whether `id` is such a request.
+/// A reply that comes later and brings what lasts must end it again, a disconnect must free its index: the request
+/// stays, though nobody waits for it. Returns whether `id` is such a request.
 bool ClientSession::abandon_request(RequestId id, TimePoint deadline) {
   const auto found = pending_.find(id);
   if (found == pending_.end()) return false;
   auto& pending = found->second;
   if (pending.type == EntryType::wire_connect_req) {
     if (const auto wire = find_connecting_wire(pending, id); wire != wires_.end()) wires_.erase(wire);
-  } else if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req) {
+  } else if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req &&
+             pending.type != EntryType::client_session_op_req &&
+             (pending.type != EntryType::function_call_req || pending.path.empty())) {
     return false;
   }
   pending.is_abandoned = true;

@@ -96,10 +96,26 @@ void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) 
   wire.early.reset();
 }
 
-/// A wire that came too late is one that nobody wants, unless it was connected anew: that is the same connection.
-void ClientSession::disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now) {
-  if (entry.error != ErrorCode::none || wires_.contains(PathMemberView{pending.path, pending.member->name})) return;
-  begin_request(EntryType::wire_disconnect_req, pending.path, pending.member->name);
+/// What came too late is ended: nobody wants it. Not a wire that was connected anew, which is the same connection, nor
+/// a lock that was asked for anew.
+void ClientSession::end_late(const Message& message, const MessageEntry& entry, const Pending& pending, Now now) {
+  if (entry.error != ErrorCode::none) return;
+  const auto* member = pending.member;
+  if (pending.type == EntryType::wire_connect_req) {
+    if (wires_.contains(PathMemberView{pending.path, member->name})) return;
+    begin_request(EntryType::wire_disconnect_req, pending.path, member->name);
+  } else if (member) {
+    const auto index = read_generator_index(message, entry, *member);
+    if (!index) return;
+    begin_request(EntryType::generator_next_req, pending.path, member->name);
+    (void)write_generator_step(outgoing_, GeneratorStep::close, *index, {}, *member, types_);  // nothing that can fail
+  } else {
+    const bool is_monitor = entry.member_name.ends_with("Enter");  // also where the service has it wait
+    if (!is_monitor && !entry.member_name.starts_with("Request")) return;
+    for (const auto& [id, other] : pending_)
+      if (other.type == pending.type && !other.is_abandoned && other.path == pending.path) return;
+    begin_request(pending.type, pending.path, is_monitor ? "MonitorExit" : "ReleaseObjectLock");
+  }
   send_outgoing(now);  // its reply is nobody's
 }
 
@@ -128,12 +144,18 @@ void ClientSession::handle_wire_closed(const MessageEntry& entry) {
 
 void ClientSession::release_wires(std::string_view path) {
   for (auto wire = wires_.begin(); wire != wires_.end();) {
-    if (!is_within(wire->first.path, path)) {
-      ++wire;
-      continue;
+    const auto released = wire++;
+    const auto& key = released->first;
+    if (!is_within(key.path, path)) continue;
+    if (released->second.state == WireState::connecting) {
+      const auto id = released->second.request_id;
+      Completed failed{id, make_error(ErrorCode::object_not_found, "object " + quote(key.path) + " was replaced")};
+      cancel(id);  // with the wire
+      emit(std::move(failed));
+    } else {
+      emit(WireClosedByService{key.path, key.member});
+      wires_.erase(released);
     }
-    emit(WireClosedByService{wire->first.path, wire->first.member});
-    wire = wires_.erase(wire);
   }
 }
 

@@ -85,8 +85,8 @@ std::vector<const ServiceDefinition*> HostedService::definitions_for_client() co
   return definitions;
 }
 
-Result<HostedService::Found> HostedService::find_object(std::string_view path) {
-  if (const auto known = objects_.find(path); known != objects_.end()) return known->second;
+Result<HostedService::Found> HostedService::find_object(std::string_view path, RememberObjects remembers) {
+  if (const auto known = objects_.find(path); known != objects_.end()) return Found(known->second);
   const auto segments = parse_service_path(path);
   if (!segments) return segments.error();
   if (segments->front().name != name_)
@@ -113,9 +113,38 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
     if (!found.type || found.type->kind != EntityKind::object)
       return make_error(ErrorCode::internal_error,
                         "object " + quote(prefix) + " has the unknown type " + quote(found.object->type_name()));
-    if (objects_.size() < max_cached_objects) remember(std::string(prefix), found);
+    if (remembers == RememberObjects::no) continue;
+    // One that is not remembered would be another object for each who asks: none of them would hear of the others'.
+    if (objects_.size() >= max_cached_objects && !make_room(prefix))
+      return make_error(ErrorCode::out_of_system_resource,
+                        "object " + quote(prefix) + ": clients of the service use " + std::to_string(objects_.size()) +
+                            " paths of objects already, expected at most " + std::to_string(max_cached_objects));
+    remember(std::string(prefix), found);
   }
   return found;
+}
+
+std::shared_ptr<const void> HostedService::use_object(std::string_view path) {
+  const auto known = objects_.find(path);
+  if (known == objects_.end()) return nullptr;
+  auto& use = known->second.use;
+  if (!use) use = std::make_shared<char>();
+  return use;
+}
+
+/// Forgets a path that nobody uses, to begin with those behind `path`. Returns whether there was one.
+bool HostedService::make_room(std::string_view path) {
+  const auto is_unused = [this](const auto& known) {
+    return known.second.use.use_count() <= 1 && known.first != name_;
+  };
+  const auto behind = objects_.upper_bound(path);
+  auto victim = std::find_if(behind, objects_.end(), is_unused);
+  if (victim == objects_.end()) {
+    victim = std::find_if(objects_.begin(), behind, is_unused);
+    if (victim == behind) return false;
+  }
+  forget(victim);
+  return true;
 }
 
 Result<> HostedService::add_object(const std::string& path, std::shared_ptr<ServiceObject> object) {
@@ -160,7 +189,7 @@ std::vector<std::string> HostedService::paths_of(const ServiceObject& object) co
 
 void HostedService::remember(std::string path, Found found) {
   if (const auto known = objects_.find(path); known != objects_.end()) forget(known);
-  const auto object = objects_.emplace(std::move(path), std::move(found)).first;
+  const auto object = objects_.emplace(std::move(path), Known(std::move(found))).first;
   paths_.emplace(object->second.object.get(), object->first);
 }
 

@@ -45,6 +45,9 @@ std::string_view implements_name(const EntityDefinition& type, const ImplementsD
 /// Errors   invalid_argument.
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index);
 
+/// Whether objects that are found stay for others.
+enum class RememberObjects : std::uint8_t { no, yes };
+
 /// One service of a node.
 class HostedService {
  public:
@@ -82,10 +85,13 @@ class HostedService {
     std::shared_ptr<ServiceObject> object;
     const EntityDefinition* type = nullptr;
   };
-  /// Walks the path from the root and caches what it finds.
-  /// Errors   those of parse_service_path; object_not_found (not this service, null object); member_not_found;
-  ///          invalid_argument (a missing or malformed index).
-  Result<Found> find_object(std::string_view path);
+  /// Walks the path from the root and remembers what it finds, so that it is the same for all. Where there is no room,
+  /// a path that no client uses is forgotten for it. Errors   those of parse_service_path; object_not_found (not this
+  /// service, null object); member_not_found;
+  ///          invalid_argument (a missing or malformed index); out_of_system_resource.
+  Result<Found> find_object(std::string_view path, RememberObjects remembers = RememberObjects::yes);
+  /// The path of an object that was found is remembered for as long as its caller has this, unless it is released.
+  std::shared_ptr<const void> use_object(std::string_view path);
   bool has_object(std::string_view path) const { return objects_.contains(path); }
   /// An object of a remote service that was found. Another one may be forgotten for it.
   /// Errors   service_definition_error: its type is not known.
@@ -96,10 +102,15 @@ class HostedService {
   std::vector<std::string> paths_of(const ServiceObject& object) const;
 
  private:
-  using Objects = std::map<std::string, Found, std::less<>>;
+  struct Known : Found {
+    explicit Known(Found found) : Found(std::move(found)) {}
+    std::shared_ptr<const void> use = nullptr;  ///< shared with whoever uses the path; null: nobody has yet
+  };
+  using Objects = std::map<std::string, Known, std::less<>>;
 
   HostedService() = default;
   void remember(std::string path, Found found);
+  bool make_room(std::string_view path);
   Objects::iterator forget(Objects::iterator object);
 
   std::string name_;

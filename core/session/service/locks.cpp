@@ -52,7 +52,7 @@ Result<> ServiceSession::answer_object_lock(const MessageEntry& entry, Now now) 
   if (!service_->policy().allow_object_lock)
     return make_error(ErrorCode::permission_denied, "This service does not allow object locks");
   const auto service = service_;
-  if (const auto found = service->find_object(entry.service_path); !found) return found.error();
+  if (const auto found = find_object(entry.service_path); !found) return found.error();
   if (!user_) return {};  // the application, which was asked, has ended the session
   const auto path = canonical_path(entry.service_path);
   auto& locks = service->object_locks();
@@ -71,8 +71,7 @@ Result<> ServiceSession::answer_monitor(const Message& message, const MessageEnt
   const auto command = entry.member_name;
   if (command != "MonitorEnter" && command != "MonitorContinueEnter" && command != "MonitorExit")
     return protocol_error("Invalid ClientSessionOp command");
-  const auto service = service_;
-  auto found = service->find_object(entry.service_path);
+  auto found = find_object(entry.service_path);
   if (!found) return found.error();
   if (!service_) return {};  // the application, which was asked, has ended the session
   auto& monitors = service_->monitor_locks();
@@ -173,7 +172,7 @@ void ServiceSession::leave_locks() {
   user_.reset();
 }
 
-void ServiceSession::set_user(std::optional<AuthenticatedUser> user) {
+void ServiceSession::set_user(std::optional<AuthenticatedUser> user, Now now) {
   auto& locks = service_->object_locks();
   if (user_) locks.handle_logout(user_->name, session_id_);
   user_ = std::move(user);
@@ -181,8 +180,10 @@ void ServiceSession::set_user(std::optional<AuthenticatedUser> user) {
   if (may_use_service()) return;
   // Logged out of a service that requires a user: what was connected until now ends, too.
   leave_monitors();
-  end_all_wires();
-  release_pipes(service_->name());
+  const auto root = service_->name();
+  const Error why{ErrorCode::authentication_error, "the user has logged out"};
+  release_wires(root, why, now);
+  release_pipes(root, why, now);
 }
 
 }  // namespace rr

@@ -86,7 +86,7 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(reply_type(login.type), login.path, login.member, login.request_id);
   if (result) {
-    change_user(std::move(*result));
+    change_user(std::move(*result), now);
     connection_.authorise();
     outgoing_.add_text("return", "OK");
   } else {
@@ -95,9 +95,9 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
   send_outgoing(now);
 }
 
-void ServiceSession::change_user(std::optional<AuthenticatedUser> user) {
-  set_user(std::move(user));
-  if (service_->is_remote()) events_.push(UserChanged{});
+void ServiceSession::change_user(std::optional<AuthenticatedUser> user, Now now) {
+  set_user(std::move(user), now);
+  if (service_ && service_->is_remote()) events_.push(UserChanged{});
 }
 
 /// ClientSessionOpReq: logins and logouts here, locks and monitors elsewhere.
@@ -114,7 +114,7 @@ Result<> ServiceSession::answer_session_op(const Message& message, const Message
     return make_error(ErrorCode::invalid_operation, "User authentication not activated for this service");
   if (command == "AuthenticateUser") return begin_login(message, entry, service_, now);
   if (command == "LogoutUser") {
-    change_user(std::nullopt);
+    change_user(std::nullopt, now);
     begin_reply(entry);
     outgoing_.add_text("return", "OK");
     send_outgoing(now);

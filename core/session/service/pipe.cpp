@@ -150,11 +150,13 @@ void ServiceSession::close_pipe(PipeId id, Now now) {
   send_outgoing(now);
 }
 
-void ServiceSession::release_pipes(std::string_view path) {
+void ServiceSession::release_pipes(std::string_view path, const Error& why, Now now) {
   std::vector<PipeId> released;
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
+    refuse_pipe(id, why, now);  // which does nothing to one that is open
+    if (is_gone_) return;       // what could not be sent has ended the session
     leave_pipe(id, PipeEnd::service);
     events_.push(PipeClosed{id});
   }

@@ -146,10 +146,15 @@ void ServiceSession::handle_object_found(std::string_view path, const Result<>& 
     if (!service_ || !decode(request.message, options, message)) return;
     const auto& entry = message.entries[request.entry];
     if (refuse_reused_id(entry, now)) return;
-    if (found)
-      handle_entry(message, entry, now);
-    else
+    if (!found)
       send_error(entry, found.error(), now);
+    else if (must_wait_for_object(entry))  // it is not looked for again, which might go on for ever
+      send_error(entry,
+                 make_error(ErrorCode::object_not_found,
+                            "object " + quote(request.path) + " was found, but the service does not have it any more"),
+                 now);
+    else
+      handle_entry(message, entry, now);
   }
 }
 

@@ -125,6 +125,7 @@ void ServiceSession::leave(Error reason, Now now) {
   pipe_indices_.clear();
   parked_.clear();
   locks_.clear();
+  used_objects_.clear();
   end_callbacks(reason);
   events_.push(ClientGone{std::move(reason)});
 }
@@ -202,10 +203,11 @@ Result<> ServiceSession::send_event(EventPacket& packet, Now now) {
 void ServiceSession::release_path(std::string_view path, Now now) {
   if (!service_) return;
   const auto is_released = [path](std::string_view other) { return is_within(other, path); };
-  for (auto wire = wires_.begin(); wire != wires_.end();)
-    wire = is_released(wire->first.path) ? end_wire(wire) : std::next(wire);
-  release_pipes(path);
+  const auto why = make_error(ErrorCode::object_not_found, "object " + quote(path) + " was replaced");
+  release_wires(path, why, now);
+  release_pipes(path, why, now);
   end_generators(generators_.remove_released(is_released));
+  std::erase_if(used_objects_, [&](const auto& used) { return is_released(used.first); });
   if (!may_use_service()) return;
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::service_path_released_req, path, {});
@@ -329,8 +331,8 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
       return {};
     case EntryType::object_type_name: {
       if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
-      const auto service = service_;
-      const auto found = service->find_object(entry.service_path);
+      const auto service = service_;  // whose type is named; the application, which is asked, may end the session
+      const auto found = find_object(entry.service_path);
       if (!found) return found.error();
       begin_reply(entry);  // anew: the application, which was asked, may have had this session send something
       outgoing_.add_text("objecttype", found->type->qualified_name);
@@ -342,9 +344,18 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
   }
 }
 
-Result<> ServiceSession::dispatch_member(const Message& message, const MessageEntry& entry, Now now) {
+/// The object behind a path, which the service remembers for as long as this client is there. The application, which is
+/// asked, may end the session.
+Result<HostedService::Found> ServiceSession::find_object(std::string_view path) {
   const auto service = service_;
-  auto found = service->find_object(entry.service_path);
+  auto found = service->find_object(path);
+  if (found && service_ && !service->is_remote() && path != service->name() && !used_objects_.contains(path))
+    used_objects_.emplace(path, service->use_object(path));
+  return found;
+}
+
+Result<> ServiceSession::dispatch_member(const Message& message, const MessageEntry& entry, Now now) {
+  auto found = find_object(entry.service_path);
   if (!found) return found.error();
   if (!service_) return {};  // the application, which was asked, has ended the session
   const auto* member = found->type->find_member(entry.member_name);

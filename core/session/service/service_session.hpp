@@ -278,6 +278,8 @@ class ServiceSession {
   Wires::iterator end_wire(Wires::iterator wire);
   Ledgers& ended();
   void end_all_wires();
+  void release_wires(std::string_view path, const Error& why, Now now);
+  Result<HostedService::Found> find_object(std::string_view path);
 
   // node-level requests (special.cpp)
   void handle_special(const Message& message, Now now);
@@ -321,8 +323,8 @@ class ServiceSession {
   void tell_others_of_monitors();
   void leave_monitors();
   void leave_locks();
-  void set_user(std::optional<AuthenticatedUser> user);
-  void change_user(std::optional<AuthenticatedUser> user);
+  void set_user(std::optional<AuthenticatedUser> user, Now now);
+  void change_user(std::optional<AuthenticatedUser> user, Now now);
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);
@@ -367,7 +369,8 @@ class ServiceSession {
   void handle_pipe_packets(const Message& message, const MessageEntry& entry, Now now);
   Result<> handle_pipe_packet(const Message& message, const MessageElement& element, ServicePipe& pipe);
   void handle_pipe_acks(const Message& message, const MessageEntry& entry);
-  void release_pipes(std::string_view path);
+  /// `why`  for those that wait for an answer.
+  void release_pipes(std::string_view path, const Error& why, Now now);
   void send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now);
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
@@ -412,6 +415,8 @@ class ServiceSession {
   Value told_attributes_;     ///< borrowed by outgoing_
   Value session_attributes_;  ///< likewise
   SessionId session_id_ = 0;  ///< while service_ is set
+  /// Paths of objects that the client has asked for, and what has the service remember them meanwhile.
+  std::map<std::string, std::shared_ptr<const void>, std::less<>> used_objects_;
   std::vector<OpenEnter> enters_;
   std::optional<AuthenticatedUser> user_;
   std::unique_ptr<OpenLogin> login_;

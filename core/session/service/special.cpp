@@ -238,7 +238,7 @@ Result<> ServiceSession::write_root_type(const Message& message, const MessageEn
   if (!service) return object_not_found();
   if (service->policy().require_valid_user && entry.service_path != service->name()) return object_not_found();
   auto begun = std::exchange(outgoing_, {});  // the application, which is asked, may have this session send something
-  const auto found = service->find_object(entry.service_path);
+  const auto found = service->find_object(entry.service_path, RememberObjects::no);
   outgoing_ = std::move(begun);
   if (!found) return object_not_found();
   const bool is_root = found->type == &service->root_type();
@@ -321,10 +321,10 @@ void ServiceSession::finish_combined(const OpenLogin& login, Result<Authenticate
   send_outgoing(now);
 }
 
-/// `service` may be null.
+/// `service` may be null. It may have been withdrawn while a login was judged, and another one be of its name now.
 Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, const NodeId& client,
                                  std::uint32_t client_endpoint, std::optional<AuthenticatedUser> user, Now now) {
-  if (!service || is_gone_) return service_not_found();
+  if (!service || is_gone_ || directory_.find(service->name()) != service) return service_not_found();
   if (service_) return has_session_already();
   service_ = std::move(service);
   endpoint_ = directory_.endpoints().take(now.steady);
@@ -333,7 +333,7 @@ Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, const N
   connection_.set_endpoints(endpoint_, client_endpoint);
   outgoing_.header.sender_endpoint = endpoint_;
   session_id_ = service_->next_session_id();
-  set_user(std::move(user));
+  set_user(std::move(user), now);
   if (client_endpoint != 0 && may_use_service()) connection_.authorise();
   events_.push(ClientConnected{service_.get()});
   return {};

@@ -145,6 +145,16 @@ ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
   return wires_.erase(wire);
 }
 
+/// Those that wait for an answer get `why`; the others' clients know by other means.
+void ServiceSession::release_wires(std::string_view path, const Error& why, Now now) {
+  std::vector<std::pair<std::string, const MemberDefinition*>> waiting;
+  for (const auto& [key, wire] : wires_)
+    if (wire.state == WireState::connecting && is_within(key.path, path)) waiting.emplace_back(key.path, wire.member);
+  for (const auto& [of, member] : waiting) answer_wire(of, *member, why, now);
+  for (auto wire = wires_.begin(); wire != wires_.end();)
+    wire = is_within(wire->first.path, path) ? end_wire(wire) : std::next(wire);
+}
+
 void ServiceSession::end_all_wires() {
   while (!wires_.empty()) end_wire(wires_.begin());
 }

@@ -252,3 +252,26 @@ TEST_CASE("one client runs a bounded number of generators") {
   script.next_service<GeneratorEnded>();
   script.open("count");
 }
+
+TEST_CASE("a generator that is opened when nobody waits for it any more is closed") {
+  Script script;
+  script.client->set_request_timeout(1s);
+  const auto id = script.client->open_generator("arm", "count", {}, script.now);
+  script.pump();
+  script.called = script.next_service<Called>();
+  script.generator = script.called.generator;
+  const bool is_cancelled = GENERATE(false, true);
+  if (is_cancelled) {
+    script.client->cancel(id);
+  } else {
+    script.advance(1s);
+    script.client->handle_timeout(script.now);
+    CHECK(script.next_client<Completed>().result.error().code == ErrorCode::request_timeout);
+  }
+  script.service->reply(script.called.id, Value{}, script.now);
+  script.expect_step(CallKind::generator_close, {}, Value{});
+  script.pump();
+  CHECK(script.next_service<GeneratorEnded>().id == script.generator);
+  CHECK_FALSE(script.client->poll_event());
+  CHECK(script.client->pending_requests() == 0);
+}

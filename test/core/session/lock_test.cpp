@@ -93,6 +93,19 @@ class Clients {
     pump();
     return id;
   }
+  /// The service gets what `who` has sent, and its answers wait.
+  void send(Client& who) { home_.carry(*who.client, *who.service, 1 << 20); }
+  /// Time passes in which `who` hears of its service, but gets no answer.
+  void hold_answers(Client& who, std::chrono::seconds time) {
+    for (auto left = time; left.count() > 0; --left) {
+      home_.advance(std::chrono::seconds(1));
+      home_.forge(*who.service, [](Message& message) {
+        message.begin_entry(EntryType::client_keep_alive_ret, "arm", {}, 1'000'000);
+      });
+      home_.carry(*who.service, *who.client, 1 << 20);
+      who.client->handle_timeout(home_.now);
+    }
+  }
   Result<Value> exit(Client& who) { return ask(who, who.client->exit_monitor("arm", home_.now)); }
   void advance(std::chrono::milliseconds time) {
     home_.advance(time);
@@ -460,4 +473,68 @@ TEST_CASE("urgent messages go ahead of what waits, in their own order") {
   CHECK(pair.next_service<Called>().member->name == "alarm");
   CHECK(pair.next_service<Called>().member->name == "speed");
   CHECK(ordinary < urgent);
+}
+
+TEST_CASE("a lock or monitor that is granted when its client has given it up is given back") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  alice.client->set_request_timeout(std::chrono::seconds(1));
+  const auto give_up = [&](RequestId id) {
+    const bool is_cancelled = GENERATE(false, true);
+    all.send(alice);
+    if (is_cancelled) {
+      alice.client->cancel(id);
+      all.pump();
+      CHECK_FALSE(alice.done.contains(id));
+    } else {
+      all.advance(std::chrono::seconds(1));
+      CHECK(all.ask(alice, id).error().code == ErrorCode::request_timeout);
+    }
+  };
+  SECTION("lock") {
+    const auto kind = GENERATE(LockKind::user, LockKind::client);
+    give_up(alice.client->lock("arm", kind, all.now()));
+    CHECK(all.service().object_locks().empty());
+    CHECK(all.lock(bob));
+  }
+  SECTION("monitor") {
+    give_up(alice.client->enter_monitor("arm", std::chrono::milliseconds(-1), all.now()));
+    CHECK(all.ask(bob, all.enter(bob)));
+  }
+  CHECK(alice.client->pending_requests() == 0);
+}
+
+TEST_CASE("a monitor that a client waits for no more goes to the next one") {
+  Clients all;
+  auto& first = all.add("");
+  auto& second = all.add("");
+  auto& third = all.add("");
+  CHECK(all.ask(first, all.enter(first)));
+  second.client->cancel(all.enter(second));
+  const auto waits = all.enter(third);
+  all.advance(std::chrono::seconds(5));  // the second is told to go on waiting
+  CHECK(all.exit(first));
+  CHECK(all.ask(third, waits));
+}
+
+TEST_CASE("a lock that was given up is kept if it was asked for anew since") {
+  Clients all;
+  auto& alice = all.add("alice");
+  const auto first = alice.client->lock("arm", LockKind::user, all.now());
+  alice.client->cancel(first);
+  const auto unlocked = alice.client->unlock("arm", all.now());
+  CHECK(all.lock(alice));
+  CHECK(all.ask(alice, unlocked));
+  CHECK(all.service().object_locks().size() == 1);
+}
+
+TEST_CASE("what is given up and never answered is forgotten") {
+  Clients all;
+  auto& alice = all.add("alice");
+  alice.client->set_request_timeout(std::chrono::seconds(1));
+  alice.client->cancel(alice.client->lock("arm", LockKind::user, all.now()));
+  CHECK(alice.client->pending_requests() == 1);
+  all.hold_answers(alice, std::chrono::seconds(61));
+  CHECK(alice.client->pending_requests() == 0);
 }

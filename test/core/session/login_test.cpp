@@ -357,3 +357,21 @@ TEST_CASE("a second session on one connection is refused, the first lives") {
   pair.service->reply(pair.next_service<Called>().id, Value(1.0), pair.now);
   CHECK(pair.completion(id));
 }
+
+TEST_CASE("whoever is let in when the service has been withdrawn joins neither it nor its successor") {
+  const bool has_successor = GENERATE(false, true);
+  Guarded pair(true);
+  pair.start(login("alice", password("secret")));
+  const auto requested = pair.next_service<LoginRequested>();
+  REQUIRE(pair.directory.remove("arm"));
+  if (has_successor) {
+    auto types = std::make_shared<TypeRegistry>();
+    types->add({definition}, RobdefMode::strict).value();
+    pair.directory.add(HostedService::make("arm", pair.root, types, {}).value()).value();
+  }
+  pair.service->answer_login(requested.id, AuthenticatedUser{"alice", {}, {}}, pair.now);
+  pair.pump();
+  CHECK(pair.next_client<SessionClosed>().reason.code == ErrorCode::service_not_found);
+  CHECK(pair.service->service() == nullptr);
+  CHECK_FALSE(pair.service->poll_event());
+}

@@ -29,6 +29,7 @@ end
 object Tool
   property string name
   memory double[] notes
+  wire double force
 end
 
 object Arm

@@ -491,3 +491,64 @@ TEST_CASE("requests are bounded until they are answered; what is too much is ref
     CHECK(open == 0);
   }
 }
+
+TEST_CASE("an object that is gone again when it was found is not looked for without end") {
+  Remote pair;
+  const auto looked_up = pair.client->find_object("arm.tool", pair.now);
+  pair.pump();
+  pair.next_service<ObjectWanted>();
+  pair.service->handle_object_found("arm.tool", {}, pair.now);
+  const auto error = pair.completion(looked_up).error();
+  CHECK(error.code == ErrorCode::object_not_found);
+  CHECK_THAT(error.message, Catch::Contains("'arm.tool' was found"));
+  CHECK_FALSE(pair.service->poll_event());
+}
+
+TEST_CASE("connects that wait for an answer get one when their object is replaced, or their user logs out") {
+  struct Anybody final : Authenticator {
+    Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
+      return AuthenticatedUser{attempt.username};
+    }
+  };
+  Remote pair;
+  SecurityPolicy policy;
+  policy.authenticator = std::make_shared<Anybody>();
+  policy.require_valid_user = true;
+  pair.hosted().set_policy(policy);
+  const auto login = pair.client->authenticate("alice", Value(MapString{}), pair.now);
+  pair.pump();
+  pair.service->answer_login(pair.next_service<LoginRequested>().id, AuthenticatedUser{"alice"}, pair.now);
+  pair.next_service<UserChanged>();
+  REQUIRE(pair.completion(login));
+  const auto wire = pair.client->connect_wire("arm", "torque", pair.now);
+  const auto pipe = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  pair.next_service<WireConnected>();
+  const auto id = pair.next_service<PipeConnected>().id;
+  const auto expect_refused = [&](ErrorCode code) {
+    for (const auto request : {wire, pipe}) {
+      const auto done = pair.next_client<Completed>();
+      CHECK(done.id == request);
+      REQUIRE_FALSE(done.result);
+      CHECK(done.result.error().code == code);
+    }
+  };
+  SECTION("replaced") {
+    pair.service->release_path("arm", pair.now);
+    pair.pump();
+    expect_refused(ErrorCode::object_not_found);
+  }
+  SECTION("logged out") {
+    const auto logout = pair.client->logout(pair.now);
+    pair.pump();
+    expect_refused(ErrorCode::authentication_error);
+    CHECK(pair.completion(logout));
+  }
+  CHECK(pair.next_service<PipeClosed>().id == id);
+  CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+  // What the other node says of them now is too late.
+  pair.service->answer_wire("arm", pair.member("torque"), {}, pair.now);
+  pair.service->accept_pipe(id, pair.now);
+  pair.pump();
+  CHECK_FALSE(pair.client->poll_event());
+}

@@ -366,3 +366,63 @@ TEST_CASE("few paths lead to one object, and all of them are released with it") 
   CHECK(service.has_object(longest));
   CHECK(service.forget_path("arm.tools[a%2db%2ec]").empty());
 }
+
+namespace {
+
+std::string slot(int number) {
+  return "arm.slots[" + std::to_string(number) + "]";
+}
+
+}  // namespace
+
+TEST_CASE("a path is remembered while a client uses it; where there is no room, an object is refused") {
+  constexpr int room = 4095;  // beside the root
+  Loopback pair;
+  pair.connect();
+  auto& hosted = *pair.directory.find("arm");
+  const auto find = [&](const std::string& path) { return pair.completion(pair.client->find_object(path, pair.now)); };
+  for (int i = 0; i < room; ++i) find(slot(i)).value();
+  const auto refused = find(slot(room));
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == ErrorCode::out_of_system_resource);
+  CHECK_THAT(refused.error().message, Catch::Contains("'arm.slots[4095]'") && Catch::Contains("at most 4096"));
+  for (const auto i : {0, 7, room - 1}) CHECK(hosted.has_object(slot(i)));
+
+  SECTION("a path that is released makes room for one") {
+    for (const auto& spelling : hosted.forget_path(slot(7))) pair.service->release_path(spelling, pair.now);
+    pair.pump();
+    pair.next_client<PathReleased>();
+    CHECK(find(slot(room)));
+    CHECK_FALSE(find(slot(room + 1)));
+  }
+  SECTION("the paths of a client that has left go where there is need") {
+    pair.service->handle_closed({ErrorCode::connection_error, "gone"}, pair.now);
+    CHECK(hosted.has_object(slot(room - 1)));
+    ClientOptions options;
+    options.connection.self = {client_id, "test.client"};
+    options.service = "arm";
+    pair.client = std::make_unique<ClientSession>(options, pair.now);
+    pair.service = std::make_unique<ServiceSession>(pair.directory, ServiceSessionOptions{}, pair.now);
+    pair.connect();
+    CHECK(find(slot(3)));
+    for (int i = room; i < 2 * room - 1; ++i) find(slot(i)).value();
+    CHECK(hosted.has_object(slot(3)));
+    CHECK_FALSE(hosted.has_object(slot(4)));
+    CHECK_FALSE(find(slot(4)));
+  }
+}
+
+TEST_CASE("an object that is asked for without a session is not remembered") {
+  Loopback pair;
+  pair.connect();
+  pair.forge(*pair.client, [](Message& message) {
+    message.begin_entry(EntryType::get_node_info, {}, {}, 100);
+    message.begin_entry(EntryType::object_type_name, "arm.tools[a]", {}, 101);
+  });
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  std::string bytes;
+  for (const auto& part : pair.service->poll_transmit()) bytes.append(part.begin(), part.end());
+  CHECK_THAT(bytes, Catch::Contains("experimental.loopback.Tool"));
+  CHECK(pair.root->asked == std::vector<std::string>{"tools[a]"});
+  CHECK_FALSE(pair.directory.find("arm")->has_object("arm.tools[a]"));
+}

@@ -197,3 +197,23 @@ TEST_CASE("a value that does not fit holds up no other wire while the stream is 
     if (const auto* received = std::get_if<WireReceived>(&*event)) last = received->value.to<double>().value();
   CHECK(last == 2.0);
 }
+
+TEST_CASE("a wire whose object is replaced while it is being connected fails, and is left") {
+  Loopback pair;
+  pair.connect();
+  pair.completion(pair.client->find_object("arm.tool", pair.now)).value();
+  const auto connecting = pair.client->connect_wire("arm.tool", "force", pair.now);
+  pair.service->release_path("arm.tool", pair.now);
+  pair.carry(*pair.service, *pair.client, 1u << 20);
+  const auto failed = pair.next_client<Completed>();
+  CHECK(failed.id == connecting);
+  REQUIRE_FALSE(failed.result);
+  CHECK(failed.result.error().code == ErrorCode::object_not_found);
+  CHECK_THAT(failed.result.error().message, Catch::Contains("was replaced"));
+  CHECK(pair.next_client<PathReleased>().path == "arm.tool");
+  pair.pump();  // the service connects it, as it was asked to
+  pair.next_service<WireConnected>();
+  CHECK(pair.next_service<WireDisconnected>().path == "arm.tool");
+  CHECK_FALSE(pair.service->has_wire("arm.tool", "force"));
+  CHECK_FALSE(pair.client->poll_event());
+}

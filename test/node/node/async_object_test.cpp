@@ -398,3 +398,78 @@ TEST_CASE("connecting can be cancelled") {
   CHECK(code == ErrorCode::operation_cancelled);
   CHECK(io.stopped());
 }
+
+TEST_CASE("a wire that is connected again stays so when the answer to a cancelled connect comes") {
+  SlowArm slow;
+  RunningNode node([&](Node& made) { slow.add_to(made); });
+  asio::io_context io;
+  AsyncObject arm;
+  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
+  while (!arm.connection() && io.run_one() != 0) {
+  }
+  asio::cancellation_signal first;
+  bool is_cancelled = false;
+  int received_by_first = 0;
+  int received_by_second = 0;
+  arm.connect_wire(
+      "torque", [&](const Value&, TimeSpec) { ++received_by_first; },
+      asio::bind_cancellation_slot(first.slot(), [&](const std::exception_ptr& failure, const Value&) {
+        is_cancelled = error_of([&] { std::rethrow_exception(failure); }).code == ErrorCode::operation_cancelled;
+      }));
+  first.emit(asio::cancellation_type::terminal);
+  bool is_connected = false;
+  arm.connect_wire(
+      "torque", [&](const Value&, TimeSpec) { ++received_by_second; },
+      [&](const std::exception_ptr& failure, const Value&) { is_connected = failure == nullptr; });
+  while (!(is_cancelled && is_connected) && io.run_one() != 0) {
+  }
+  for (int turn = 0; turn < 100 && received_by_second == 0; ++turn) {
+    bool is_done = false;
+    arm.call_values("jam", {}, [&](const std::exception_ptr&, const Value&) { is_done = true; });  // sets the wire
+    while (!is_done && io.run_one() != 0) {
+    }
+  }
+  CHECK(received_by_first == 0);
+  CHECK(received_by_second > 0);
+  CHECK(arm.send_wire("torque", 1.0));
+  arm.connection()->disconnect();
+  io.run();
+}
+
+TEST_CASE("a connection keeps no handler of what failed, and none that is given to it after its end") {
+  RunningNode node(add_arm);
+  asio::io_context io;
+  std::shared_ptr<ClientConnection> connection;
+  ClientConnection::open(io, node.url("Arm"), {},
+                         [&](Result<std::shared_ptr<ClientConnection>> opened) { connection = std::move(*opened); });
+  while (!connection && io.run_one() != 0) {
+  }
+  const auto watch = std::make_shared<int>();
+  int failures = 0;
+  const auto connect = [&](const std::string& wire) {
+    connection->on_wire_closed("Arm", wire, [watch] {});
+    connection->connect_wire(
+        "Arm", wire, [watch](const Value&, TimeSpec) {},
+        [&](const Result<Value>& result) { failures += result ? 0 : 1; });
+  };
+  connect("nothing");
+  CHECK(failures == 1);
+  CHECK(watch.use_count() == 1);
+  connection->disconnect();
+  io.run();
+  io.restart();
+  REQUIRE(connection->is_closed());
+  connect("torque");
+  CHECK(failures == 2);
+  connection->on_event("Arm", "bumped", [watch](std::span<const Value>) {});
+  connection->on_callback("Arm", "ask", [watch](std::span<const Value>) { return Result<Value>(Value(1.0)); });
+  connection->on_path_released([watch](const std::string&) {});
+  CHECK(watch.use_count() == 1);
+  int ends = 0;
+  connection->on_closed([&, keep = connection](const Error&) { ++ends; });
+  CHECK(ends == 0);  // not from within
+  const std::weak_ptr<ClientConnection> weak = std::exchange(connection, nullptr);
+  io.run();
+  CHECK(ends == 1);
+  CHECK(weak.expired());
+}

@@ -1,8 +1,10 @@
 #include "node/client/client.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
+#include <thread>
 
 #include "core/session/service/subscription_losses.hpp"
 #include "test/node/node/node_fixture.hpp"
@@ -19,6 +21,7 @@ stdver 0.10
 object Echo
     function string say(string text)
     function void provoke()
+    function void flood()
     event said(string text)
     wire int32 count
     pipe string words
@@ -26,7 +29,7 @@ object Echo
 end
 )";
 
-void add_echo(Node& node) {
+std::shared_ptr<Service> add_echo(Node& node) {
   auto service = Service::from_text({definition}, "Echo", "Echo");
   service->function("say", [service = service.get()](std::string text) {
     service->fire("said", text);
@@ -41,8 +44,13 @@ void add_echo(Node& node) {
                              if (answer) service->set_wire("count", *answer);
                            });
   });
+  service->function("flood", [service = service.get()] {
+    const Value packet(std::string(1024 * 1024, 'x'));
+    for (int i = 0; i < 16; ++i) service->pipe("words").broadcast(packet);
+  });
   service->set_wire("count", 5);
   node.add(service);
+  return service;
 }
 
 }  // namespace
@@ -198,4 +206,68 @@ TEST_CASE("an event calls all its handlers, in their order, until they are taken
   CHECK(order == "abdadd");
   echo.connection().close();
   third.remove();
+}
+
+TEST_CASE("a wait ends in time though handlers that wait take longer than what they are called for") {
+  std::shared_ptr<Service> service;
+  RunningNode node([&](Node& made) { service = add_echo(made); });
+  const auto echo = connect(node.url("Echo"));
+  int handled = 0;
+  echo.connect_wire("count", [&](const Value&, TimeSpec) {
+    std::this_thread::sleep_for(2ms);
+    echo.call("say", "x");
+    ++handled;
+  });
+  std::atomic<bool> is_over = false;
+  std::thread setter([&] {
+    const auto end = std::chrono::steady_clock::now() + 5s;
+    for (std::int32_t i = 0; !is_over && std::chrono::steady_clock::now() < end; ++i) {
+      node.ask([&](Node&) {
+        service->set_wire("count", i);
+        return 0;
+      });
+      std::this_thread::sleep_for(1ms);
+    }
+  });
+  const auto begun = std::chrono::steady_clock::now();
+  const auto elapsed = [&] { return std::chrono::steady_clock::now() - begun; };
+  echo.connection().run_for(200ms);
+  CHECK(elapsed() < 1s);
+  echo.connection().run_until([&] { return handled >= 3; }, 3s);
+  echo.call("say", "y");
+  CHECK(elapsed() < 4s);
+  CHECK(handled >= 3);
+  is_over = true;
+  setter.join();
+}
+
+TEST_CASE("a session that ends with its beginning is known as closed") {
+  RunningNode node([](Node& made) { add_echo(made)->on_client_connected([&made](ClientId) { made.stop(); }); });
+  const auto echo = connect(node.url("Echo"));
+  CHECK(echo.connection().run_until([&] { return echo.connection().is_closed(); }, 5s));
+  const auto begun = std::chrono::steady_clock::now();
+  echo.connection().run_for(1s);
+  CHECK(std::chrono::steady_clock::now() - begun < 500ms);
+  CHECK(error_of([&] { echo.call("say", "x"); }).code == ErrorCode::connection_error);
+}
+
+TEST_CASE("what waits for handlers that take too long is bounded in bytes, too") {
+  RunningNode node([](Node& made) { add_echo(made); });
+  const auto echo = connect(node.url("Echo"));
+  std::string reason;
+  echo.connection().asynchronous().on_closed([&](const Error& error) { reason = error.message; });
+  bool is_first = true;
+  int floods = 0;
+  Error failure{ErrorCode::none, {}};
+  const auto pipe = echo.connect_pipe("words", [&](const Value&) {
+    if (!std::exchange(is_first, false)) return;
+    failure = error_of([&] {
+      for (; floods < 6; ++floods) echo.call("flood");  // 16 MiB each
+    });
+  });
+  echo.call("provoke");
+  echo.connection().run_until([&] { return echo.connection().is_closed(); }, 20s);
+  CHECK(floods == 3);
+  CHECK(failure.code != ErrorCode::none);
+  CHECK_THAT(reason, Contains("bytes: they take too long") && Contains("67108864 bytes"));
 }

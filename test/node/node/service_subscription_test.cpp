@@ -382,3 +382,26 @@ TEST_CASE("what cannot be subscribed to is refused at once") {
   options.path = "bulb";
   CHECK_THAT(refusal([&] { lamps.wire("heat", options); }), Contains("\"*\""));
 }
+
+TEST_CASE("a subscription of a wire that is closed leaves the wire to one that was made since") {
+  LampNode lamp;
+  asio::io_context io;
+  run(io, [&]() -> asio::awaitable<void> {
+    auto lamps = subscribe_service(io, lamp.url(), quick());
+    const auto client = co_await lamps.client(5s);
+    auto first = lamps.wire("light");
+    first.close();  // its connect is not answered yet
+    auto second = lamps.wire("light");
+    while (second.connected_count() == 0) co_await client.get("level");
+    CHECK(second.send(7).value() == 1);
+    const auto seven = co_await second.next(5s);
+    CHECK(number(seven.value) == 7);
+    auto third = lamps.wire("light");
+    while (third.connected_count() == 0) co_await client.get("level");
+    second.close();
+    co_await client.get("level");
+    CHECK(third.send(8).value() == 1);
+    const auto eight = co_await third.next(5s);
+    CHECK(number(eight.value) == 8);
+  });
+}

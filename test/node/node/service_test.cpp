@@ -137,3 +137,23 @@ TEST_CASE("a service needs a definition that holds its root type") {
   CHECK_THAT(refusal([] { Service::from_text({}, "none", "X"); }), Contains("no definition"));
   CHECK_THAT(refusal([] { Service::from_file("no/such.robdef", "x", "X"); }), Contains("no/such.robdef"));
 }
+
+TEST_CASE("an object that a service has no room for is refused; until then each is one and the same for all") {
+  std::shared_ptr<Service> lamp;
+  RunningNode node([&](Node& made) {
+    lamp = make_complete_lamp();
+    lamp->objref("bulbs", [made = lamp.get()](std::string_view) {
+      auto bulb = made->make_object("Bulb");
+      bulb->property("watts").get([] { return 5.0; }).set([](double) {});
+      return bulb;
+    });
+    made.add(lamp);
+  });
+  const auto client = connect(node.url("lamp"));
+  for (int i = 0; i < 4095; ++i) client.object("bulbs", std::to_string(i));
+  const auto refused = error_of([&] { client.object("bulbs", "4095"); });
+  CHECK(refused.code == ErrorCode::out_of_system_resource);
+  CHECK_THAT(refused.message, Contains("'lamp.bulbs[4095]'") && Contains("expected at most 4096"));
+  client.connection().close();
+  CHECK_NOTHROW(connect(node.url("lamp")).object("bulbs", "4095"));
+}
