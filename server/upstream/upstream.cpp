@@ -85,6 +85,7 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
     return;
   }
   ++clients_left_;
+  commands_.erase(&client);
   std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
   for (;;) {  // the device may be lost with it, and end those of others
     const auto it = endpoints_.lower_bound({&client, 0});
@@ -271,8 +272,7 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
       self->request(client, called, done);
     });
   }
-  // Whoever reads behind a command wants to know what has come of it, not what was asked for before.
-  if (use_of(called.kind) == MemberUse::command) reads_.clear();
+  if (device_->config().shares_reads && use_of(called.kind) == MemberUse::command) commands_[&client] = ++last_step_;
   if (called.generator != 0) return answer_generator(client, called, path, std::move(done));
   if (called.kind == rr::CallKind::function) {
     const auto number = ++last_call_;
@@ -286,7 +286,7 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   // It may be the last; nothing of it is touched where nothing is offered.
   const auto connection = locks_->is_urgent(path, *called.member) ? connection_ : nullptr;
   if (connection) connection->set_urgent(true);
-  begin_request(called, path, std::move(done));
+  begin_request(client, called, path, std::move(done));
   if (connection) connection->set_urgent(false);
 }
 
@@ -341,26 +341,32 @@ void Upstream::send_safe(const SafeRequest& request, Completion done) {
   }
 }
 
-void Upstream::share_read(const std::string& path, const std::string& property, Completion done) {
+/// Whoever reads behind a command of its own hears what has come of that: no answer to what was asked before it.
+void Upstream::share_read(const UpstreamClient& client, const std::string& path, const std::string& property,
+                          Completion done) {
   const MemberKey key(path, property);
-  auto& joinable = reads_[key];
-  if (joinable) return joinable->push_back(std::move(done));
-  const auto readers = joinable = std::make_shared<std::vector<Completion>>();
-  readers->push_back(std::move(done));
-  connection_->get(path, property, [weak = weak_from_this(), key, readers](const rr::Result<rr::Value>& value) {
+  const auto command = commands_.find(&client);
+  auto& newest = reads_[key];
+  if (newest && (command == commands_.end() || command->second < newest->begun))
+    return newest->readers.push_back(std::move(done));
+  const auto read = newest = std::make_shared<SharedRead>();
+  read->begun = ++last_step_;
+  read->readers.push_back(std::move(done));
+  connection_->get(path, property, [weak = weak_from_this(), key, read](const rr::Result<rr::Value>& value) {
     const auto self = weak.lock();
     if (!self) return;
-    if (const auto found = self->reads_.find(key); found != self->reads_.end() && found->second == readers)
+    if (const auto found = self->reads_.find(key); found != self->reads_.end() && found->second == read)
       self->reads_.erase(found);
-    for (const auto& reader : *readers) reader(value);
+    for (const auto& reader : read->readers) reader(value);
   });
 }
 
-void Upstream::begin_request(const rr::Called& called, const std::string& path, Completion done) {
+void Upstream::begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path,
+                             Completion done) {
   const auto& name = called.member->name;
   switch (called.kind) {
     case rr::CallKind::property_get:
-      if (device_->config().shares_reads) return share_read(path, name, std::move(done));
+      if (device_->config().shares_reads) return share_read(client, path, name, std::move(done));
       return connection_->get(path, name, std::move(done));
     case rr::CallKind::property_set:
       return connection_->set(path, name, called.arguments.front(), std::move(done));

@@ -267,6 +267,11 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::string function;
     std::int32_t index = 0;
   };
+  /// A read that several clients wait for.
+  struct SharedRead {
+    std::uint64_t begun = 0;  ///< counts reads and commands
+    std::vector<Completion> readers;
+  };
   struct OpenCall {
     UpstreamClient* client = nullptr;
     std::string path;
@@ -300,8 +305,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
   void handle_released(const std::string& path);
-  void share_read(const std::string& path, const std::string& property, Completion done);
-  void begin_request(const rr::Called& called, const std::string& path, Completion done);
+  void share_read(const UpstreamClient& client, const std::string& path, const std::string& property, Completion done);
+  void begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
   void send_safe(const SafeRequest& request, Completion done);
   void answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
   void attach_wire(const MemberKey& key);
@@ -367,8 +372,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
   std::vector<OpenCall> calls_;  ///< of functions, oldest first
-  /// Where reads are shared: who waits for those that others may join.
-  std::map<MemberKey, std::shared_ptr<std::vector<Completion>>> reads_;
+  // Where reads are shared:
+  std::map<MemberKey, std::shared_ptr<SharedRead>> reads_;   ///< the newest that others may join
+  std::map<const UpstreamClient*, std::uint64_t> commands_;  ///< when each client has commanded something last
+  std::uint64_t last_step_ = 0;
   std::uint64_t last_call_ = 0;
 };
 
