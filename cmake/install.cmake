@@ -21,6 +21,8 @@ install(TARGETS rrgate-create-serial rrgate-demo-conference-room rrgate-demo-cre
         RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
 install(FILES examples/baxter/baxter.py RENAME rrgate-demo-baxter.py
         DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
+install(FILES examples/create-minimal/serial_robot.py RENAME rrgate-demo-create-minimal.py
+        DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
 install(FILES examples/baxter/experimental.baxter.robdef
         DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
 

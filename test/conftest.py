@@ -3,7 +3,7 @@ import pytest
 
 # Checks that helpers make count as the test's own.
 pytest.register_assert_rewrite("clients", "cpp_frames", "found_nodes", "gateways", "http_api", "load", "network", "news", "pages",
-                               "processes", "reverse_proxies", "shell", "tap", "users")
+                               "processes", "reverse_proxies", "serial_scenarios", "shell", "tap", "users")
 
 
 def pytest_runtest_call(item):

@@ -6,7 +6,8 @@ namespace conference_room {
 
 namespace definition = experimental::conference_room;
 
-Controller::Controller(boost::asio::io_context& io, const std::string& lights, const std::vector<std::string>& sensors)
+Controller::Controller(boost::asio::io_context& io, const std::string& lights, const std::vector<std::string>& sensors,
+                       const std::vector<std::string>& guests)
     : io_(io), lights_(rr::subscribe_service(io, lights)) {
   lights_.on_connected([this](const rr::AsyncObject& object) {
     const definition::LightsAsyncClient client(object);
@@ -15,14 +16,16 @@ Controller::Controller(boost::asio::io_context& io, const std::string& lights, c
     });
   });
   lights_.on_lost([this](const auto&, const auto&) { light_places_.clear(); });
-  for (const auto& url : sensors) subscribe_sensors(url);
+  for (const auto& url : sensors) subscribe_sensors(url, false);
+  for (const auto& url : guests) subscribe_sensors(url, true);
 }
 
-void Controller::subscribe_sensors(const std::string& url) {
+void Controller::subscribe_sensors(const std::string& url, bool is_guest) {
   auto service = rr::subscribe_service(io_, url);
   auto readings = service.wire(&definition::SensorsAsyncClient::readings);
   groups_.push_back(std::make_unique<Group>(Group{std::move(service), std::move(readings)}));
   auto& group = *groups_.back();
+  group.is_guest = is_guest;
   group.service.on_connected([&group](const rr::AsyncObject& object) {
     definition::SensorsAsyncClient(object).places().get([&group](std::exception_ptr failure, Places places) {
       if (!failure) group.places = std::move(places);
@@ -39,7 +42,10 @@ void Controller::step() {
   Places places;
   Colours readings;
   for (const auto& group : groups_) {
-    if (group->places.empty() || group->newest.size() != group->places.size()) return;
+    if (group->places.empty() || group->newest.size() != group->places.size()) {
+      if (group->is_guest) continue;
+      return;
+    }
     places.insert(places.end(), group->places.begin(), group->places.end());
     readings.insert(readings.end(), group->newest.begin(), group->newest.end());
   }

@@ -14,7 +14,9 @@ namespace conference_room {
 class Controller : public experimental::conference_room::ControllerService {
  public:
   /// Stays connected to the lights and to all sensors, for as long as it lives.
-  Controller(boost::asio::io_context& io, const std::string& lights, const std::vector<std::string>& sensors);
+  /// `guests`  sensors that may be missing, such as phones: they count while they are there.
+  Controller(boost::asio::io_context& io, const std::string& lights, const std::vector<std::string>& sensors,
+             const std::vector<std::string>& guests);
   /// To be called regularly. Does nothing while a device is not there: the lights stay as they are.
   void step();
 
@@ -26,9 +28,10 @@ class Controller : public experimental::conference_room::ControllerService {
     Readings readings;
     Places places = {};  ///< empty: not connected
     Colours newest = {};
+    bool is_guest = false;
   };
 
-  void subscribe_sensors(const std::string& url);
+  void subscribe_sensors(const std::string& url, bool is_guest);
 
   Colour get_target() override { return target_; }
   void set_target(Colour target) override;

@@ -1,6 +1,9 @@
 // rrgate-demo-conference-room: four nodes in one process. Layer: example.
 //
-//   rrgate-demo-conference-room [--port N]...    of the controller, the lights, the northern and the southern sensors
+//   rrgate-demo-conference-room [--port N]... [--sensors URL]...
+//
+// Ports are those of the controller, the lights, the northern and the southern sensors. The controller also follows the
+// sensors of each URL while they are there.
 #include <array>
 #include <iostream>
 
@@ -11,7 +14,7 @@ namespace {
 
 using namespace conference_room;
 
-void run(const std::array<std::string, 4>& ports) {
+void run(const std::array<std::string, 4>& ports, const std::vector<std::string>& guests) {
   const auto lights = std::make_shared<Lights>();
   const auto places = sensor_places();
   const auto half = places.begin() + static_cast<std::ptrdiff_t>(places.size() / 2);
@@ -35,7 +38,7 @@ void run(const std::array<std::string, 4>& ports) {
 
   // The controller knows the devices by their URLs alone: it could run on another machine.
   const auto controller =
-      std::make_shared<Controller>(controller_node.io_context(), lights_url, std::vector{north_url, south_url});
+      std::make_shared<Controller>(controller_node.io_context(), lights_url, std::vector{north_url, south_url}, guests);
   controller_node.add(rr::make_service("Controller", controller));
   std::cout << "controller: " << listen(controller_node, ports[0], "Controller") << "\nlights: " << lights_url
             << "\nsensors: " << north_url << " " << south_url << std::endl;
@@ -54,16 +57,22 @@ void run(const std::array<std::string, 4>& ports) {
 int main(int count, char** words) {
   std::array<std::string, 4> ports;
   ports.fill("0");
+  std::vector<std::string> guests;
   std::size_t given = 0;
   for (int i = 1; i < count; i += 2) {
-    if (std::string_view(words[i]) != "--port" || i + 1 == count || given == ports.size()) {
-      std::cerr << "usage: rrgate-demo-conference-room [--port N]... (four at most)\n";
+    const std::string_view word = words[i];
+    const bool is_port = word == "--port" && given < ports.size();
+    if (i + 1 == count || (!is_port && word != "--sensors")) {
+      std::cerr << "usage: rrgate-demo-conference-room [--port N]... (four at most) [--sensors URL]...\n";
       return 2;
     }
-    ports[given++] = words[i + 1];
+    if (is_port)
+      ports[given++] = words[i + 1];
+    else
+      guests.emplace_back(words[i + 1]);
   }
   try {
-    run(ports);
+    run(ports, guests);
   } catch (const std::exception& failure) {
     std::cerr << "rrgate-demo-conference-room: " << failure.what() << '\n';
     return 1;

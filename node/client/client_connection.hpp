@@ -126,6 +126,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler);
   /// Errors   the wire is not connected; those of packing.
   Result<> send_wire(std::string_view path, std::string_view wire, const Value& value);
+  /// Drops a value that send_wire() keeps because much waits for the stream.
+  void drop_waiting_value(std::string_view path, std::string_view wire) { session_.drop_waiting_value(path, wire); }
   /// Completes with the index of the endpoint, which may be another than the one asked for. Packets follow.
   RequestId connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, PipeHandlers handlers,
                          Completion done);

@@ -91,7 +91,7 @@ std::string CppTypes::declared_name(std::string_view qualified_name, std::string
   auto chosen = cpp_word(std::string(name) + std::string(suffix));
   const auto* definition = set_.find_service(service);
   // Classes that are made from an object's name give way to names of the definition; all do to inner namespaces.
-  const auto is_taken = [&] {
+  const auto is_taken = [&, service = service, name = name] {  // clang 14 captures no bindings by itself
     if (set_.has_service_within(std::string(service) + '.' + chosen)) return true;
     if (suffix.empty() || !definition) return false;
     return has_name(*definition, chosen) ||

@@ -97,6 +97,11 @@ std::string_view to_string(Verb verb) {
   return verb_names[static_cast<std::size_t>(verb)];
 }
 
+std::string_view to_string(Extent extent) {
+  constexpr std::string_view names[] = {"none", "some", "all"};
+  return names[static_cast<std::size_t>(extent)];
+}
+
 std::optional<Verb> parse_verb(std::string_view text) {
   const auto* found = std::find(std::begin(verb_names), std::end(verb_names), text);
   if (found == std::end(verb_names)) return std::nullopt;
@@ -133,14 +138,22 @@ std::optional<AgentTerms> AccessRules::terms(const Identity& who, const AccessRe
   return out;
 }
 
+Extent AccessRules::extent(const Identity& who, std::string_view device, Verb verb) const {
+  const bool needs_agent_rule = is_agent(who) && is_command(verb);
+  if (may_all(who) && !needs_agent_rule) return Extent::all;
+  auto out = Extent::none;
+  for (const auto& rule : rules_) {
+    if (!gives(rule, verb) || !is_for(rule, who) || !fits(rule.devices, device)) continue;
+    if (needs_agent_rule && !rule.agent) continue;
+    const bool is_of_whole_services = fits_all(rule.paths) && fits_all(rule.members);
+    if (is_of_whole_services && fits_all(rule.services)) return Extent::all;
+    if (is_of_whole_services || verb != Verb::record) out = Extent::some;
+  }
+  return out;
+}
+
 rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_view device) const {
-  if (may_all(who) && !is_agent(who)) return {};
-  const auto has_all_of = [&](Verb verb) {
-    return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
-      return gives(rule, verb) && is_for(rule, who) && fits(rule.devices, device) && fits_all(rule.services) &&
-             fits_all(rule.paths) && fits_all(rule.members);
-    });
-  };
+  const auto has_all_of = [&](Verb verb) { return extent(who, device, verb) == Extent::all; };
   if (!is_agent(who) && std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
   return denied(who, "do everything to " + (device.empty() ? "a device" : "device " + rr::quote(device)) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
@@ -157,6 +170,12 @@ bool AccessRules::sees_all(const Identity& who) const {
 bool AccessRules::sees_any(const Identity& who) const {
   if (may_all(who)) return true;
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) { return gives_something(rule, who); });
+}
+
+bool AccessRules::gives_any(const Identity& who, Verb verb) const {
+  if (may_all(who)) return true;
+  return std::any_of(rules_.begin(), rules_.end(),
+                     [&](const AccessRule& rule) { return gives(rule, verb) && is_for(rule, who); });
 }
 
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,

@@ -30,6 +30,10 @@ constexpr bool is_device_verb(Verb verb) {
   return verb <= Verb::record;
 }
 
+/// Of how much of a device somebody may do something.
+enum class Extent : std::uint8_t { none, some, all };
+std::string_view to_string(Extent extent);
+
 /// What it takes to connect a wire or a pipe: where clients only send, nobody hears anything by it.
 inline Verb verb_to_connect(const rr::MemberDefinition& member) {
   return member.direction() == rr::MemberDirection::writeonly ? Verb::write : Verb::subscribe;
@@ -82,6 +86,9 @@ class AccessRules {
   /// On which terms an agent may write or call something: those of all rules that give it together. nullopt: it may
   /// not, or is no agent.
   std::optional<AgentTerms> terms(const Identity& who, const AccessRequest& what) const;
+  /// How much of a device somebody may do something to. all: by one rule; rules that together give it on every part
+  /// are some. `verb`  one that is_device_verb().
+  Extent extent(const Identity& who, std::string_view device, Verb verb) const;
   /// Whether somebody may do all of device_verbs to everything of a device: only then can his bytes pass unread.
   /// Errors   permission_denied.
   [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device) const;
@@ -93,6 +100,8 @@ class AccessRules {
   bool sees_all(const Identity& who) const;
   /// Whether there is any device at all that somebody may do something to.
   bool sees_any(const Identity& who) const;
+  /// Whether there may be something that somebody may do this to.
+  bool gives_any(const Identity& who, Verb verb) const;
 
   bool is_open() const { return !needs_login_; }
   bool has_rules() const { return !rules_.empty(); }

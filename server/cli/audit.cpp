@@ -9,7 +9,7 @@
 #include <optional>
 #include <thread>
 
-#include "core/support/glob.hpp"
+#include "server/access/audit_tail.hpp"
 #include "server/access/audit_trail.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/printable.hpp"
@@ -21,12 +21,7 @@ namespace {
 
 struct AuditOptions {
   std::vector<std::string> files;
-  std::string user;
-  std::string device;
-  std::string member;
-  std::string since;
-  std::string outcome;
-  std::string face;
+  AuditFilter filter;
   bool follows = false;
   bool as_json = false;
   bool verifies = false;
@@ -62,24 +57,15 @@ std::string text_of(const rr::Json& record, const char* key) {
 
 class Reader {
  public:
-  Reader(const AuditOptions& options, std::string since) : options_(options), since_(std::move(since)) {}
+  explicit Reader(const AuditOptions& options) : options_(options) {}
 
   void take(const std::string& line) const {
     const auto record = rr::read_json(line);
-    if (!record || !record->is_object() || !fits(*record)) return;
+    if (!record || !record->is_object() || !options_.filter.fits(*record)) return;
     std::cout << (options_.as_json ? line : describe(*record)) << "\n";
   }
 
  private:
-  bool fits(const rr::Json& record) const {
-    const auto matches = [&](const std::string& pattern, const char* key) {
-      return pattern.empty() || rr::glob_matches(pattern, text_of(record, key));
-    };
-    return (matches(options_.user, "user") || matches(options_.user, "device_user")) &&
-           matches(options_.device, "device") && matches(options_.member, "member") &&
-           matches(options_.outcome, "outcome") && matches(options_.face, "face") && text_of(record, "time") >= since_;
-  }
-
   /// time, outcome, event, who, from where, to what, why. JSON had control characters escaped.
   static std::string describe(const rr::Json& record) {
     const auto get = [&](const char* key) { return printable(text_of(record, key)); };
@@ -97,7 +83,6 @@ class Reader {
   }
 
   const AuditOptions& options_;
-  std::string since_;
 };
 
 ino_t file_number(const std::string& file) {
@@ -156,18 +141,20 @@ int verify(const AuditOptions& options) {
   return trail->findings.empty() ? exit_ok : exit_failed;
 }
 
-int read_audit(const AuditOptions& options) {
-  const auto since = parse_since(options.since);
+int read_audit(const AuditOptions& given) {
+  auto options = given;
+  const auto since = parse_since(given.filter.since);
   if (!since)
-    return usage_error("audit", "--since " + rr::quote(options.since) +
+    return usage_error("audit", "--since " + rr::quote(given.filter.since) +
                                     ": expected a time as 2030-01-31T12:00, or as 15m, 2h or 7d how long ago");
+  options.filter.since = *since;
   if (options.verifies) return verify(options);
   const auto files = sort_audit_files(options.files);
   if (!files) {
     report_failure("audit", files.error().message);
     return exit_unreadable;
   }
-  const Reader reader(options, *since);
+  const Reader reader(options);
   for (const auto& file : *files) {
     std::ifstream in(file);
     if (options.follows && file == files->back()) {
@@ -190,15 +177,15 @@ void add_audit(Commands& commands) {
   const auto add_filter = [&app = app, verifies](const char* name, std::string& value, const char* summary) {
     return app.add_option(name, value, summary)->option_text("PATTERN")->excludes(verifies);
   };
-  add_filter("--user", options.user, "User of the gateway or of a device; '*' and '?' as in rules");
-  add_filter("--device", options.device, "Device");
-  add_filter("--member", options.member, "Member");
-  add_filter("--since", options.since, "Since this time: 2030-01-31T12:00 (UTC), or 15m, 2h, 7d ago")
+  add_filter("--user", options.filter.user, "User of the gateway or of a device; '*' and '?' as in rules");
+  add_filter("--device", options.filter.device, "Device");
+  add_filter("--member", options.filter.member, "Member");
+  add_filter("--since", options.filter.since, "Since this time: 2030-01-31T12:00 (UTC), or 15m, 2h, 7d ago")
       ->option_text("TIME");
-  add_filter("--outcome", options.outcome, "ok, error or refused")
+  add_filter("--outcome", options.filter.outcome, "ok, error or refused")
       ->check(CLI::IsMember({"ok", "error", "refused"}))
       ->option_text("OUTCOME");
-  add_filter("--face", options.face, "native, websocket, rest, stream or json")
+  add_filter("--face", options.filter.face, "native, websocket, rest, stream or json")
       ->check(CLI::IsMember({"native", "websocket", "rest", "stream", "json", "mcp"}))
       ->option_text("FACE");
   app.add_flag("--follow", options.follows, "Continue with new records, until Ctrl-C")->excludes(verifies);

@@ -79,6 +79,13 @@ std::vector<DemoSystem> list_systems() {
   const DemoDevice create{
       "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
   const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam"};
+  const auto robot = [&create](std::string_view name) {
+    auto one = create;
+    one.name = name;
+    return one;
+  };
+  auto minimal = create;
+  minimal.program = "rrgate-demo-create-minimal.py";
   const auto assembly = [](std::string_view name, std::string_view service) {
     DemoDevice part{name, "rrgate-demo-microassembly", service};
     part.arguments = {std::string(name)};
@@ -88,21 +95,28 @@ std::vector<DemoSystem> list_systems() {
   auto riding_webcams = webcams, standing_webcams = webcams;
   riding_webcams.follows_first = true;
   standing_webcams.has_cameras = true;
-  return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, riding_webcams}},
-          {"webcams", "the cameras of this machine, or two that stand in a room", {standing_webcams}},
-          {"conference-room",
-           "lights and colour sensors of a room, and a controller that holds the light at a target",
-           {{"controller", "rrgate-demo-conference-room", "Controller"},
-            {"lights", "", "Lights"},
-            {"sensors-north", "", "Sensors"},
-            {"sensors-south", "", "Sensors"}}},
-          {"microassembly",
-           "six probes under four microscopes, on nodes that find one another",
-           {assembly("cell", "Cell"), assembly("stages", "Stages"), assembly("cameras", "Cameras"),
-            assembly("illuminators", "Illuminators")}},
-          {"baxter",
-           "two arms with grippers and cameras on a wheelchair, in Python (robotraconteur-abstract-robot)",
-           {{"baxter", "rrgate-demo-baxter.py", "base", baxter}}}};
+  return {
+      {"create", "a mobile robot in a room, and two cameras that ride on it", {create, riding_webcams}},
+      {"create-minimal",
+       "a mobile robot on a serial line, whose bytes are simulated, with the paper's definition (python3)",
+       {minimal}},
+      {"fleet",
+       "six mobile robots, each in a room and on a node of its own",
+       {robot("robot-1"), robot("robot-2"), robot("robot-3"), robot("robot-4"), robot("robot-5"), robot("robot-6")}},
+      {"webcams", "the cameras of this machine, or two that stand in a room", {standing_webcams}},
+      {"conference-room",
+       "lights and colour sensors of a room, and a controller that holds the light at a target",
+       {{"controller", "rrgate-demo-conference-room", "Controller"},
+        {"lights", "", "Lights"},
+        {"sensors-north", "", "Sensors"},
+        {"sensors-south", "", "Sensors"}}},
+      {"microassembly",
+       "six probes under four microscopes, on nodes that find one another",
+       {assembly("cell", "Cell"), assembly("stages", "Stages"), assembly("cameras", "Cameras"),
+        assembly("illuminators", "Illuminators")}},
+      {"baxter",
+       "two arms with grippers and cameras on a wheelchair, in Python (robotraconteur-abstract-robot)",
+       {{"baxter", "rrgate-demo-baxter.py", "base", baxter}}}};
 }
 
 int print_systems(bool is_json) {

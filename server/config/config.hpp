@@ -87,10 +87,9 @@ struct LeaseConfig {
   std::vector<SafeAction> safe;       ///< done in this order when a lease ends whose object they are at or below
   std::vector<std::string> takeover;  ///< roles of those who may take a lease from others; "*": everybody
 
-  /// `member`  "path.member"
+  /// `member`  "path.member", however an index is spelled: "Create.arms[left%5fone].stop", "Create.arms.left_one.stop".
   LeaseNeed need_of(std::string_view member) const;
-  /// Whether commands of a member pass all that keeps others waiting. `place`  "path.member", or with a dot before each
-  /// index: "Create.arm.0.stop".
+  /// Whether commands of a member pass all that keeps others waiting. `place`  as above.
   bool is_urgent(std::string_view place) const;
   bool operator==(const LeaseConfig&) const = default;
 };

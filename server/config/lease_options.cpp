@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/support/glob.hpp"
+#include "core/support/hex.hpp"
 
 namespace rrgate {
 
@@ -47,11 +48,18 @@ void read_safe_action(ObjectReader& in, SafeAction& action) {
   action.json = !is_call ? value : arguments.empty() ? "[]" : arguments;
 }
 
-/// "Create.arm[0].stop" as "Create.arm.0.stop".
+/// "Create.arm[left%5fone].stop" as "Create.arm.left_one.stop", patterns too: an index has many spellings.
 std::string dotted(std::string_view place) {
   std::string out;
-  for (const auto c : place)
-    if (c != ']') out += c == '[' ? '.' : c;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    const auto c = place[i];
+    if (const auto byte = c == '%' ? rr::hex_byte(place.substr(i + 1)) : -1; byte >= 0) {
+      out += static_cast<char>(byte);
+      i += 2;
+    } else if (c != ']') {
+      out += c == '[' ? '.' : c;
+    }
+  }
   return out;
 }
 
@@ -68,16 +76,14 @@ void read_leases(ObjectReader& in, LeaseConfig& leases) {
 }
 
 LeaseNeed LeaseConfig::need_of(std::string_view member) const {
+  const auto place = dotted(member);
   const auto rule = std::find_if(members.begin(), members.end(),
-                                 [&](const auto& each) { return rr::glob_matches(each.member, member); });
+                                 [&](const auto& each) { return rr::glob_matches(dotted(each.member), place); });
   return rule == members.end() ? LeaseNeed::covered : rule->need;
 }
 
 bool LeaseConfig::is_urgent(std::string_view place) const {
-  const auto name = dotted(place);
-  const auto rule = std::find_if(members.begin(), members.end(),
-                                 [&](const auto& each) { return rr::glob_matches(dotted(each.member), name); });
-  return is_offered && rule != members.end() && rule->need == LeaseNeed::never;
+  return is_offered && need_of(place) == LeaseNeed::never;
 }
 
 }  // namespace rrgate

@@ -162,6 +162,10 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
       .enter = make_entrance(gateway, *destination.node, connection, rights),
       .lock_rights = {
+          .admit =
+              [rights](auto path, const auto* user, bool is_asked) {
+                return rights->admit_lock(path, user, is_asked ? Recorded::each_time : Recorded::never);
+              },
           .begin = [rights](const auto& wanted, const auto* user) { return rights->begin_lock(wanted, user); },
           .has_role = [rights](auto role, const auto* user) { return rights->has_role(role, user); }},
       .is_encrypted = connection.peer.is_encrypted,

@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/access.hpp"
 #include "server/http/endpoints/agents.hpp"
+#include "server/http/endpoints/audit.hpp"
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
@@ -24,7 +25,10 @@ constexpr std::size_t largest_body = 8 * 1024;
 rr::awaitable<void> answer_with_body(Handler handler, ResponseWriter& writer, std::string rest) {
   auto response = co_await writer.read_body(largest_body);
   if (!response) response = handler(writer.request(), rest);
-  co_await writer.send(*response);
+  if (response->answer_later)
+    co_await response->answer_later(writer);
+  else
+    co_await writer.send(*response);
 }
 
 /// For handlers that look at the body.
@@ -59,6 +63,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/recordings/*", with_body(stop_recording_endpoint(gateway))},
       {delete_, "/api/v1/recordings/*", delete_recording_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
+      {get, "/api/v1/audit", audit_endpoint(gateway)},
       {post, "/api/v1/session", sign_in_endpoint(gateway)},
       {delete_, "/api/v1/session", sign_out_endpoint(gateway)},
       {post, "/api/v1/tickets", tickets_endpoint(gateway)},

@@ -64,6 +64,11 @@ class ResponseWriter {
   /// The same for text in parts, borrowed for the wait; none of it, or all, is empty.
   rr::awaitable<rr::error_code> write(std::span<const std::string_view> parts);
   rr::awaitable<rr::error_code> end();
+  /// Instead of end(), where the rest can't be had: the connection breaks off, so that nobody takes it for the whole.
+  void break_off() {
+    closes_ = true;
+    stream_.close();
+  }
 
   /// See ResponseOptions.
   void set_patience(std::chrono::milliseconds patience) { patience_ = patience; }

@@ -11,6 +11,7 @@
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_recordings.hpp"
 #include "server/mcp/mcp_tools.hpp"
+#include "server/recordings/recordings.hpp"
 
 namespace rrgate {
 
@@ -155,6 +156,12 @@ std::string session_of(const Request& request) {
   return session_of(request.header(session_header), request);
 }
 
+/// Who has a share of what all agents have.
+std::string owner_of(const Request& request) {
+  const auto& user = request.identity.name;
+  return user.empty() ? request.origin().network : "user " + user;
+}
+
 /// What an agent calls itself: at the handshake, or in each message. Empty: it does not say.
 std::string program_of(const McpMessage& message) {
   const auto part = [](const rr::Json& of, const char* key) {
@@ -186,7 +193,7 @@ std::string shown(const rr::Json& arguments, const char* key) {
   return bounded_text(found->is_string() ? found->get<std::string>() : rr::write_json(*found), longest_shown);
 }
 
-/// A command in that list, from when it is asked for until this ends.
+/// A command in that list, until this ends.
 class ShownCommand {
  public:
   ShownCommand(AgentSession& agent, const std::string& tool, const rr::Json& arguments)
@@ -252,20 +259,24 @@ rr::OrderedJson discover() {
           {"instructions", instructions}};
 }
 
-rr::OrderedJson list_resources(GatewayState& gateway, const Identity& who, const std::string& cursor) {
+rr::OrderedJson listed_resource(const std::string& uri, const std::string& name) {
+  return {{"uri", uri}, {"name", name}, {"mimeType", "application/json"}};
+}
+
+rr::awaitable<rr::OrderedJson> list_resources(GatewayState& gateway, const Identity& who, std::string cursor) {
+  const auto recordings = co_await gateway.recordings().list(gateway.access().state_ptr(), who);
   const auto devices = devices_for_agent(gateway, who);
-  const auto recordings = recordings_for_agent(gateway, who);
   const auto page = page_of(devices.size() + recordings.size(), cursor);
   auto out = rr::OrderedJson::object();
   auto& resources = rr::add_key(out, "resources") = rr::OrderedJson::array();
   for (auto i = page.first; i < page.last; ++i) {
     const bool is_device = i < devices.size();
-    const auto& name = is_device ? devices[i]->config().name : recordings[i - devices.size()];
+    const auto& name = is_device ? devices[i]->config().name : recordings[i - devices.size()].name;
     const auto uri = std::string(is_device ? device_scheme : recording_scheme) + name;
-    resources.push_back({{"uri", uri}, {"name", name}, {"mimeType", "application/json"}});
+    resources.push_back(listed_resource(uri, name));
   }
   if (!page.next.empty()) rr::add_key(out, "nextCursor") = page.next;
-  return out;
+  co_return out;
 }
 
 rr::OrderedJson resource_templates() {
@@ -311,8 +322,9 @@ McpRefusal refusal_of(const rr::Error& error, const McpTools& tools) {
 }
 
 /// For the session's stream. Throws   McpRefusal, rr::Exception.
-rr::awaitable<rr::OrderedJson> subscribe(GatewayState& gateway, McpTools& tools, const McpMessage& message,
-                                         std::string session) {
+rr::awaitable<rr::OrderedJson> subscribe(GatewayState& gateway, McpReply& reply, McpTools& tools,
+                                         const McpMessage& message) {
+  const auto session = session_of(reply.request());
   if (session.empty())
     throw McpRefusal{invalid_request, std::string("without ") + session_header + " nobody knows whom to tell"};
   const auto uri = message.text("uri");
@@ -327,7 +339,7 @@ rr::awaitable<rr::OrderedJson> subscribe(GatewayState& gateway, McpTools& tools,
     refusal = refusal_of(exception.error(), tools);
   }
   if (refusal) throw McpRefusal(*refusal);
-  value_or_throw(gateway.agent_subscriptions().add(session, uri));
+  value_or_throw(gateway.agent_subscriptions().add(session, owner_of(reply.request()), uri));
   co_return rr::OrderedJson::object();
 }
 
@@ -343,7 +355,10 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     page_of(0, message.text("cursor"));  // all tools are one page
     co_return McpTools::list();
   }
-  if (method == "resources/list") co_return list_resources(gateway, who, message.text("cursor"));
+  if (method == "resources/list") {
+    auto cursor = message.text("cursor");
+    co_return co_await list_resources(gateway, who, std::move(cursor));
+  }
   if (method == "resources/templates/list") co_return resource_templates();
   McpTools tools(gateway, reply);
   if (method == "resources/read") {
@@ -364,9 +379,9 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     const auto found = message.params.find("arguments");
     const auto arguments = found == message.params.end() ? rr::Json::object() : *found;
     if (!arguments.is_object()) throw McpRefusal{invalid_params, "\"arguments\" is no object"};
-    std::optional<ShownCommand> command;
+    std::optional<ShownCommand> command;  // none is shown of whoever may give none
     if (McpTools::is_command(name))
-      command.emplace(agent, name, arguments);
+      tools.on_permitted([&] { command.emplace(agent, name, arguments); });
     else
       ++agent.reads;
     auto result = co_await tools.call(name, arguments);
@@ -375,7 +390,7 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     co_return std::move(*result);
   }
   if ((method == "resources/subscribe" || method == "resources/unsubscribe") && !message.is_modern)
-    co_return co_await subscribe(gateway, tools, message, session_of(reply.request()));
+    co_return co_await subscribe(gateway, reply, tools, message);
   if (method == "subscriptions/listen" && message.is_modern) {
     const auto wanted = message.params.find("notifications");
     if (wanted == message.params.end() || !wanted->is_object())
@@ -452,7 +467,7 @@ rr::awaitable<void> answer_stream(GatewayState& gateway, ResponseWriter& writer)
   const auto session = session_of(request);
   gateway.agent_requests().cancel(session, stream_name);
   const auto under_way = gateway.agent_requests().add(session, stream_name, reply.canceller());
-  const auto stream = gateway.agent_subscriptions().open_stream(session);
+  const auto stream = gateway.agent_subscriptions().open_stream(session, owner_of(request));
   if (!stream) {
     const auto response = problem_response(503, stream.error().message);
     co_await writer.send(response);

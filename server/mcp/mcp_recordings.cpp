@@ -134,14 +134,6 @@ rr::OrderedJson members_json(const std::map<std::string, RecordedCount>& members
 
 }  // namespace
 
-std::vector<std::string> recordings_for_agent(GatewayState& gateway, const Identity& who) {
-  std::vector<std::string> out;
-  const auto& rules = gateway.access().state().rules;
-  for (const auto& each : gateway.recordings().list())
-    if (rules.check(who, wanted_of(each))) out.push_back(each.name);
-  return out;
-}
-
 rr::Result<rr::OrderedJson> RecordingReading::read() const {
   std::map<std::string, RecordedCount> members;
   RecordedValues values;
@@ -168,17 +160,14 @@ rr::Result<rr::OrderedJson> RecordingReading::read() const {
 rr::awaitable<rr::OrderedJson> McpTools::read_recording(const std::string& uri) {
   const auto rest = std::string_view(uri).substr(recording_scheme.size());
   const auto slash = std::min(rest.find('/'), rest.size());
-  const auto name = rest.substr(0, slash);
-  // Who may not record the device is not told whether there is a recording.
-  const auto said = parse_recording_name(name);
-  const auto wanted = said ? wanted_of(*said) : AccessRequest{.verb = Verb::record};
-  if (const auto allowed = gateway_.access().check(who(), wanted); !allowed) {
-    gateway_.reject(allowed.error());
-    throw rr::Exception(allowed.error());
+  const std::string name(rest.substr(0, slash));
+  const auto recording = co_await gateway_.recordings().find_for(gateway_.access(), who(), name);
+  if (!recording && recording.error().code == rr::ErrorCode::resource_not_found)
+    refuse(rr::ErrorCode::resource_not_found, recording.error().message + "; resources/list names them");
+  if (!recording) {
+    gateway_.reject(recording.error());
+    throw rr::Exception(recording.error());
   }
-  const auto recording = gateway_.recordings().find(name);
-  if (!recording)
-    refuse(rr::ErrorCode::resource_not_found, "no recording " + rr::quote(name) + "; resources/list names them");
   const auto files = newest_files(*recording);
   RecordingReading reading;
   for (const auto& segment : value_or_throw(split_path(rest.substr(std::min(slash + 1, rest.size())))))
@@ -191,8 +180,8 @@ rr::awaitable<rr::OrderedJson> McpTools::read_recording(const std::string& uri) 
   };
   if (!co_await reply_.wait(longest_turn_wait, is_its_turn))
     refuse(rr::ErrorCode::out_of_system_resource, "other agents read recordings; try again in a minute");
-  auto begun = gateway_.access().check_and_begin(who(), wanted, trace_id_of(reply_.request().header("traceparent")),
-                                                 "recording_read");
+  auto begun = gateway_.access().check_and_begin(who(), wanted_of(*recording),
+                                                 trace_id_of(reply_.request().header("traceparent")), "recording_read");
   const auto entry = value_or_throw(std::move(begun));
   const auto work = [&reading] { return reading.read(); };
   auto read = co_await gateway_.workers().run(work);

@@ -5,17 +5,14 @@
 #include <string_view>
 #include <vector>
 
+#include "server/json/json.hpp"
 #include "server/record/recording.hpp"
-#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
 /// URIs: "rrgate-recording://NAME" is a recording, "rrgate-recording://NAME/SERVICE/OBJECT/MEMBER" what is recorded of
 /// a member.
 inline constexpr std::string_view recording_scheme = "rrgate-recording://";
-
-/// Names of those that the asker may have, the newest first.
-std::vector<std::string> recordings_for_agent(GatewayState& gateway, const Identity& who);
 
 /// What is read of a recording, for any thread.
 struct RecordingReading {

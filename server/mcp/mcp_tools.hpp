@@ -1,6 +1,7 @@
 // What agents can do, one tool each. Layer: server/mcp. See docs/mcp.md.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <set>
 #include <string>
@@ -26,6 +27,9 @@ class McpTools {
   /// The result of tools/call: what a tool can't do is one too. nullopt: there is no such tool.
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
+
+  /// Called once a command is found and its asker may give it, on whatever terms.
+  void on_permitted(std::function<void()> handler) { on_permitted_ = std::move(handler); }
 
   /// The image that stands beside the answer; null: there is none.
   const McpImage* image() const { return image_ ? &*image_ : nullptr; }
@@ -128,6 +132,7 @@ class McpTools {
   Standing standing_;
   std::optional<RateGate::Pass> pass_;
   std::optional<McpImage> image_;
+  std::function<void()> on_permitted_;
   bool has_asked_device_ = false;  ///< errors from then on may be in the device's words
 };
 

@@ -165,32 +165,45 @@ rr::Result<> McapWriter::write(const McapMessage& message) {
 
 rr::Result<> McapWriter::flush() {
   if (chunk_.empty()) return state_;
-  ChunkEntry entry{chunk_first_, chunk_last_, offset_};
-  entry.records_size = chunk_.size();
+  const auto begin = offset_;
+  const std::uint64_t records_size = chunk_.size();
   rr::Bytes out;
   out.reserve(chunk_.size() + 64);
   put_prefix(out, McapOpcode::chunk, 8 + 8 + 8 + 4 + 4 + 8 + chunk_.size());
-  put_number(out, entry.first);
-  put_number(out, entry.last);
-  put_number(out, entry.records_size);
+  put_number(out, chunk_first_);
+  put_number(out, chunk_last_);
+  put_number(out, records_size);
   put_number(out, add_to_crc(0, chunk_));
   put_text(out, "");  // not compressed
-  put_number(out, entry.records_size);
+  put_number(out, records_size);
   put_bytes(out, chunk_);
-  entry.length = out.size();
-  for (const auto& [channel, index] : chunk_index_) {
-    entry.message_indexes[channel] = offset_ + out.size();
-    put_prefix(out, McapOpcode::message_index, 2 + 4 + 16 * index.size());
-    put_number(out, channel);
-    put_sized(out, [&out, items = &index] {
-      for (const auto& [time, offset] : *items) {
-        put_number(out, time);
-        put_number(out, offset);
-      }
-    });
-  }
-  entry.message_indexes_length = out.size() - entry.length;
-  chunks_.push_back(std::move(entry));
+  const std::uint64_t length = out.size();
+  rr::Bytes index;
+  put_number(index, chunk_first_);
+  put_number(index, chunk_last_);
+  put_number(index, begin);
+  put_number(index, length);
+  put_sized(index, [&] {
+    for (const auto& [channel, places] : chunk_index_) {
+      put_number(index, channel);
+      put_number(index, static_cast<std::uint64_t>(begin + out.size()));
+      put_prefix(out, McapOpcode::message_index, 2 + 4 + 16 * places.size());
+      put_number(out, channel);
+      put_sized(out, [&out, items = &places] {
+        for (const auto& [time, offset] : *items) {
+          put_number(out, time);
+          put_number(out, offset);
+        }
+      });
+    }
+  });
+  put_number(index, static_cast<std::uint64_t>(out.size() - length));
+  put_text(index, "");
+  put_number(index, records_size);
+  put_number(index, records_size);
+  put_prefix(chunk_indexes_, McapOpcode::chunk_index, index.size());
+  put_bytes(chunk_indexes_, index);
+  ++chunk_count_;
   rr::clear_kept(chunk_);
   chunk_index_.clear();
   return put(out);
@@ -200,43 +213,28 @@ rr::Result<> McapWriter::flush() {
 rr::Bytes McapWriter::summary(std::uint64_t begin, std::uint64_t& offsets_begin) const {
   rr::Bytes out;
   rr::Bytes offsets;
-  const auto add_group = [&](McapOpcode opcode, const std::vector<rr::Bytes>& contents) {
-    if (contents.empty()) return;
-    const auto start = begin + out.size();
-    for (const auto& content : contents) {
-      put_prefix(out, opcode, content.size());
-      put_bytes(out, content);
-    }
+  const auto end_group = [&](McapOpcode opcode, std::uint64_t start) {
+    if (begin + out.size() == start) return;
     put_prefix(offsets, McapOpcode::summary_offset, 1 + 8 + 8);
     offsets.push_back(static_cast<std::uint8_t>(opcode));
     put_number(offsets, start);
     put_number(offsets, begin + out.size() - start);
   };
-  std::vector<rr::Bytes> chunks;
-  for (const auto& chunk : chunks_) {
-    auto& content = chunks.emplace_back();
-    put_number(content, chunk.first);
-    put_number(content, chunk.last);
-    put_number(content, chunk.offset);
-    put_number(content, chunk.length);
-    put_sized(content, [&content, indexes = &chunk.message_indexes] {
-      for (const auto& [channel, offset] : *indexes) {
-        put_number(content, channel);
-        put_number(content, offset);
-      }
-    });
-    put_number(content, chunk.message_indexes_length);
-    put_text(content, "");
-    put_number(content, chunk.records_size);
-    put_number(content, chunk.records_size);
-  }
+  const auto add_group = [&](McapOpcode opcode, const std::vector<rr::Bytes>& contents) {
+    const auto start = begin + out.size();
+    for (const auto& content : contents) {
+      put_prefix(out, opcode, content.size());
+      put_bytes(out, content);
+    }
+    end_group(opcode, start);
+  };
   rr::Bytes statistics;
   put_number(statistics, message_count_);
   put_number(statistics, static_cast<std::uint16_t>(schemas_.size()));
   put_number(statistics, static_cast<std::uint32_t>(channels_.size()));
   put_number(statistics, std::uint32_t{0});  // attachments
   put_number(statistics, static_cast<std::uint32_t>(metadata_indexes_.size()));
-  put_number(statistics, static_cast<std::uint32_t>(chunks_.size()));
+  put_number(statistics, chunk_count_);
   put_number(statistics, first_);
   put_number(statistics, last_);
   put_sized(statistics, [&] {
@@ -247,7 +245,9 @@ rr::Bytes McapWriter::summary(std::uint64_t begin, std::uint64_t& offsets_begin)
   });
   add_group(McapOpcode::schema, schemas_);
   add_group(McapOpcode::channel, channels_);
-  add_group(McapOpcode::chunk_index, chunks);
+  const auto chunks_begin = begin + out.size();
+  put_bytes(out, chunk_indexes_);
+  end_group(McapOpcode::chunk_index, chunks_begin);
   add_group(McapOpcode::metadata_index, metadata_indexes_);
   add_group(McapOpcode::statistics, {statistics});
   offsets_begin = begin + out.size();

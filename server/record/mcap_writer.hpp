@@ -37,18 +37,11 @@ class McapWriter {
   /// Of the file with what waits to be written.
   std::uint64_t size() const { return offset_ + chunk_.size(); }
   std::uint64_t message_count() const { return message_count_; }
+  /// That the index of what was written takes, in memory until close(), then in the file.
+  std::size_t index_bytes() const { return chunk_indexes_.size(); }
   const std::string& path() const { return path_; }
 
  private:
-  struct ChunkEntry {
-    McapTime first = 0;
-    McapTime last = 0;
-    std::uint64_t offset = 0;
-    std::uint64_t length = 0;
-    std::map<std::uint16_t, std::uint64_t> message_indexes;
-    std::uint64_t message_indexes_length = 0;
-    std::uint64_t records_size = 0;
-  };
   using Index = std::vector<std::pair<McapTime, std::uint64_t>>;  ///< time, offset in the chunk
 
   explicit McapWriter(std::string path) : path_(std::move(path)) {}
@@ -64,7 +57,8 @@ class McapWriter {
   std::vector<rr::Bytes> channels_;            ///< the same
   std::vector<std::uint64_t> message_counts_;  ///< of each channel
   std::vector<rr::Bytes> metadata_indexes_;
-  std::vector<ChunkEntry> chunks_;
+  rr::Bytes chunk_indexes_;  ///< records, as the summary has them
+  std::uint32_t chunk_count_ = 0;
   std::uint64_t message_count_ = 0;
   McapTime first_ = 0;
   McapTime last_ = 0;

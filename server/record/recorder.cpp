@@ -74,10 +74,10 @@ asio::awaitable<void> Recorder::record(rr::AsyncObject root) {
   record_->end_connection();
   const auto types = types_of(connection);
   ServiceRecord::FindObject find = [connection](std::string path) { return find_object(connection, std::move(path)); };
-  const auto chosen = co_await record_->choose(connection->session(), *types, std::move(find));
+  const auto choice = co_await record_->choose(connection->session(), *types, std::move(find));
   if (record_->is_closed()) co_return;
   std::vector<RecordedMemberPlace> properties;
-  for (const auto& each : chosen) {
+  for (const auto& each : choice.members) {
     if (each.member->kind == rr::MemberKind::property) {
       properties.push_back(each);
       continue;

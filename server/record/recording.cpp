@@ -214,6 +214,19 @@ rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const 
   return bad_recording(path() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
 }
 
+std::string recorded_ring(const std::string& path) {
+  auto reader = McapReader::open(path);
+  if (!reader) return {};
+  const auto header = reader->next();
+  if (!header || !*header || (*header)->opcode != McapOpcode::header) return {};
+  const auto record = reader->next();
+  if (!record || !*record || (*record)->opcode != McapOpcode::metadata) return {};
+  const auto metadata = parse_mcap_metadata((*record)->content);
+  if (!metadata || metadata->name != recorded_ring_name) return {};
+  const auto ring = metadata->texts.find("of");
+  return ring == metadata->texts.end() ? std::string() : ring->second;
+}
+
 std::string mcap_time_text(McapTime time) {
   constexpr McapTime second = 1'000'000'000;
   return rr::format_utc({static_cast<std::int64_t>(time / second), static_cast<std::int32_t>(time % second)}, 9);

@@ -76,6 +76,9 @@ class Recording {
   McapTime end_ = 0;
 };
 
+/// The ring that a file says it belongs to; empty: to none, or it can't be read. Reads its beginning alone.
+std::string recorded_ring(const std::string& path);
+
 /// "2026-11-24T15:00:00.000000000Z"
 std::string mcap_time_text(McapTime time);
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ struct RecordListener {
   std::function<void(const rr::Result<>&)> begun;
   /// What is not recorded; the rest goes on.
   std::function<void(const std::string&)> problem;
+  /// A problem that was told is one no more. `left`  the newest of the others; empty: there is none. May be null.
+  std::function<void(const std::string& left)> solved = nullptr;
   /// The file can't be written: nothing is recorded any more.
   std::function<void(const rr::Error&)> failed;
 };
@@ -53,11 +56,16 @@ class ServiceRecord : public std::enable_shared_from_this<ServiceRecord> {
 
   /// Completes with the type of an object, which lives as long as `types` of begin(). Throws   rr::Exception.
   using FindObject = std::function<boost::asio::awaitable<const rr::EntityDefinition*>(std::string path)>;
-  /// A connection is there: chooses the members, and adds what the file does not have yet.
+  struct Choice {
+    std::vector<RecordedMemberPlace> members = {};
+    bool is_complete = true;  ///< false: a pattern means nothing that is there now
+  };
+  /// A connection is there, or its objects are others: chooses the members, and adds what the file does not have yet.
+  /// Once something was chosen, what is missing is a problem that may go, and no more.
   /// `session`, `types`  are there until this is over.
   /// Throws   rr::Exception: nothing of it can be recorded, and why.
-  boost::asio::awaitable<std::vector<RecordedMemberPlace>> choose(const rr::ClientSession& session,
-                                                                  const rr::TypeRegistry& types, FindObject find);
+  boost::asio::awaitable<Choice> choose(const rr::ClientSession& session, const rr::TypeRegistry& types,
+                                        FindObject find);
 
   using GetProperty = std::function<boost::asio::awaitable<rr::Value>(const RecordedMemberPlace&)>;
   /// Reads properties again and again, until end_connection(). `types`  outlives it.
@@ -76,16 +84,24 @@ class ServiceRecord : public std::enable_shared_from_this<ServiceRecord> {
   void write_event(const RecordedMemberPlace& from, const rr::TypeRegistry& types, std::span<const rr::Value> values);
   /// Each problem is told once, until there is another at this place, or it is solved.
   void tell_problem(const std::string& where, const std::string& what);
-  void solve_problem(const std::string& where) { problems_.erase(where); }
+  void solve_problem(const std::string& where);
 
  private:
+  struct Problem {
+    std::string what;
+    std::uint64_t number = 0;  ///< counts problems
+    std::chrono::steady_clock::time_point told;
+  };
   struct Schedule;
   boost::asio::awaitable<void> choose_by(std::string pattern, const rr::ClientSession& session, const FindObject& find,
                                          RecordedService& service, std::vector<RecordedMemberPlace>& chosen);
+  void expect_known_type(const std::string& path, const rr::EntityDefinition& type) const;
+  std::string text_of(const std::string& where, const std::string& what) const;
   void add_to_file(const rr::ClientSession& session, const rr::TypeRegistry& types, RecordedService& service,
                    std::vector<RecordedMemberPlace>& chosen);
   boost::asio::awaitable<void> read_what_is_due(std::shared_ptr<Schedule> schedule);
-  void write(std::uint16_t channel, const rr::OrderedJson& message, std::optional<rr::TimeSpec> sent);
+  void write(const RecordedMemberPlace& from, const rr::OrderedJson& message, std::optional<rr::TimeSpec> sent);
+  void handle_value(const RecordedMemberPlace& from);
 
   RecordingWriter& writer_;
   std::string url_;
@@ -93,8 +109,10 @@ class ServiceRecord : public std::enable_shared_from_this<ServiceRecord> {
   RecordListener listener_;
   std::optional<RecordedService> service_;         ///< once it is in the file
   std::map<std::string, std::uint16_t> channels_;  ///< by place and member
-  std::map<std::string, std::string> problems_;    ///< told
-  std::uint64_t connection_ = 0;                   ///< counts connections
+  std::set<std::string> definition_names_;         ///< of service_
+  std::map<std::string, Problem> problems_;        ///< told, by where
+  std::uint64_t last_problem_ = 0;
+  std::uint64_t connection_ = 0;  ///< counts connections
   bool has_begun_ = false;
   bool is_closed_ = false;
 };

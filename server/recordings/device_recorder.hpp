@@ -29,18 +29,30 @@ class DeviceRecorder : public std::enable_shared_from_this<DeviceRecorder> {
   bool is_following() const { return client_ && client_->upstream()->is_open(); }
 
  private:
+  /// A wire, a pipe or an event.
+  struct Followed {
+    RecordedMemberPlace member;
+    ValueClient::ListenerPtr listener = nullptr;
+    std::shared_ptr<bool> has_ended = std::make_shared<bool>(false);  ///< for whatever reason but a lost connection
+  };
+
   boost::asio::awaitable<void> run();
   boost::asio::awaitable<void> wait(std::chrono::milliseconds time);
   boost::asio::awaitable<void> record(std::shared_ptr<ValueClient> client);
-  boost::asio::awaitable<void> follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member,
-                                      std::shared_ptr<const rr::TypeRegistry> types);
+  /// Chooses the members; those that are followed already go on. Returns whether all that is wanted is there.
+  boost::asio::awaitable<bool> follow_chosen(std::shared_ptr<ValueClient> client);
+  boost::asio::awaitable<bool> follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member);
+  void read(const std::shared_ptr<ValueClient>& client, std::vector<RecordedMemberPlace> properties);
+  bool has_one_ended() const;
+  void leave();
 
   std::shared_ptr<Device> device_;
   std::string service_;
   ValueClients& clients_;
   std::function<void(const rr::Error&)> failed_;
   std::shared_ptr<ServiceRecord> record_;
-  std::vector<ValueClient::ListenerPtr> listeners_;
+  std::vector<Followed> followed_;
+  std::vector<RecordedMemberPlace> properties_;  ///< that are read now
   rr::Backoff backoff_;
   boost::asio::steady_timer wake_;
   std::shared_ptr<ValueClient> client_;  ///< that is recorded

@@ -1,10 +1,14 @@
 #include "server/recordings/recordings.hpp"
 
 #include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <filesystem>
+#include <unordered_map>
 
-#include "node/platform/utc_time.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
 
@@ -18,109 +22,27 @@ namespace {
 using SystemClock = std::chrono::system_clock;
 using std::chrono::steady_clock;
 
-constexpr std::string_view extension = ".mcap";
+constexpr std::chrono::seconds look_period{1};
 constexpr std::chrono::seconds standing_period{60};
 constexpr std::size_t most_ended = 100;  ///< recordings that are remembered with what they came to
-
-/// "20261125T083000123Z"
-std::string name_of_time(SystemClock::time_point time) {
-  auto text = rr::format_utc(rr::to_time_spec(time), 3);
-  std::erase_if(text, [](char c) { return c == '-' || c == ':' || c == '.'; });
-  return text;
-}
-
-/// The other way; nullopt: it is no such text.
-std::optional<SystemClock::time_point> time_of_name(std::string_view text) {
-  constexpr std::string_view form = "00000000T000000000Z";
-  if (text.size() != form.size()) return std::nullopt;
-  for (std::size_t i = 0; i < form.size(); ++i)
-    if (form[i] == '0' ? text[i] < '0' || text[i] > '9' : text[i] != form[i]) return std::nullopt;
-  const auto number = [text](std::size_t at, std::size_t size) {
-    int out = 0;
-    for (const char c : text.substr(at, size)) out = out * 10 + (c - '0');
-    return out;
-  };
-  const std::chrono::year_month_day date{std::chrono::year(number(0, 4)),
-                                         std::chrono::month(static_cast<unsigned>(number(4, 2))),
-                                         std::chrono::day(static_cast<unsigned>(number(6, 2)))};
-  if (!date.ok()) return std::nullopt;
-  return std::chrono::sys_days(date) + std::chrono::hours(number(9, 2)) + std::chrono::minutes(number(11, 2)) +
-         std::chrono::seconds(number(13, 2)) + std::chrono::milliseconds(number(15, 3));
-}
-
-}  // namespace
-
-std::optional<RecordingInfo> parse_recording_name(std::string_view name) {
-  const auto last = name.rfind('.');
-  if (last == std::string_view::npos) return std::nullopt;
-  const auto begin = time_of_name(name.substr(last + 1));
-  const auto middle = name.substr(0, last).rfind('.');
-  if (!begin || middle == std::string_view::npos || middle == 0 || middle + 1 == last) return std::nullopt;
-  RecordingInfo out;
-  out.name = name;
-  out.device = name.substr(0, middle);
-  out.service = name.substr(middle + 1, last - middle - 1);
-  out.begin = out.end = *begin;
-  return out;
-}
-
-namespace {
-
-/// "NAME.mcap" is the first file, "NAME-2.mcap" the second. 0: it is none of these.
-std::uint32_t number_of_file(std::string_view file, std::string& name) {
-  if (!file.ends_with(extension)) return 0;
-  file.remove_suffix(extension.size());
-  name = file;
-  if (parse_recording_name(name)) return 1;
-  const auto dash = file.rfind('-');
-  if (dash == std::string_view::npos) return 0;
-  name = file.substr(0, dash);
-  std::uint32_t number = 0;
-  for (const char c : file.substr(dash + 1)) {
-    if (c < '0' || c > '9' || number > 100'000'000) return 0;
-    number = number * 10 + static_cast<std::uint32_t>(c - '0');
-  }
-  return number;
-}
-
-struct FoundFile {
-  std::uint32_t number = 0;
-  RecordingFile file;
-};
-
-/// All recordings of a folder, by their names.
-std::map<std::string, std::vector<FoundFile>, std::less<>> look_into(const std::string& folder) {
-  std::map<std::string, std::vector<FoundFile>, std::less<>> out;
-  std::error_code error;
-  if (folder.empty()) return out;
-  for (auto it = fs::directory_iterator(folder, error); !error && it != fs::directory_iterator(); it.increment(error)) {
-    FoundFile found;
-    found.file.name = it->path().filename().string();
-    std::string name;
-    found.number = number_of_file(found.file.name, name);
-    std::error_code of_file;
-    if (found.number == 0 || !parse_recording_name(name) || !it->is_regular_file(of_file) || it->is_symlink(of_file))
-      continue;
-    found.file.bytes = it->file_size(of_file);
-    if (of_file) continue;
-    found.file.written = std::chrono::file_clock::to_sys(it->last_write_time(of_file));
-    if (!of_file) out[name].push_back(std::move(found));
-  }
-  for (auto& [name, files] : out)
-    std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
-  return out;
-}
 
 rr::Error no_such_recording(std::string_view name) {
   return rr::make_error(rr::ErrorCode::resource_not_found, "no recording " + rr::quote(name));
 }
 
-}  // namespace
-
-std::string recording_of_file(std::string_view file) {
-  std::string name;
-  return number_of_file(file, name) > 0 && parse_recording_name(name) ? name : std::string();
+rr::Error folder_is_full(std::uint64_t max_bytes) {
+  return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                        "recordings have taken all that they may, " + std::to_string(max_bytes) + " bytes");
 }
+
+rr::Error no_room_for_clients(std::uint64_t room, std::uint64_t max_bytes) {
+  if (room == max_bytes) return folder_is_full(max_bytes);
+  return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                        "recordings have taken all that they may, " + std::to_string(room) + " bytes; " +
+                            std::to_string(max_bytes - room) + " more are for those that the configuration wants");
+}
+
+}  // namespace
 
 std::string_view to_string(RecordingState state) {
   constexpr std::string_view names[] = {"recording", "waiting", "ended", "failed"};
@@ -141,11 +63,42 @@ struct Recordings::Run {
   std::unique_ptr<RecordingWriter> writer;  ///< null: it has ended
   std::shared_ptr<DeviceRecorder> recorder;
   std::optional<steady_clock::time_point> over;
+
+  bool is_of_client() const { return writer && !info.is_standing; }
+};
+
+/// What was in the folder.
+struct Recordings::Folder {
+  RecordingFiles files;
+  std::unordered_map<std::string, std::uint64_t> sizes;  ///< of all files, by name
+  std::uint64_t bytes = 0;
+
+  explicit Folder(RecordingFiles found) : files(std::move(found)) {
+    for (const auto& [name, list] : files)
+      for (const auto& file : list) {
+        sizes[file.name] = file.bytes;
+        bytes += file.bytes;
+      }
+  }
+  std::uint64_t bytes_of(std::string_view recording) const {
+    const auto found = files.find(recording);
+    std::uint64_t out = 0;
+    if (found != files.end())
+      for (const auto& file : found->second) out += file.bytes;
+    return out;
+  }
+  /// Of a file, by its path; 0: it was not there.
+  std::uint64_t bytes_at(const std::string& path) const {
+    const auto found = sizes.find(fs::path(path).filename().string());
+    return found == sizes.end() ? 0 : found->second;
+  }
+  /// A file is about to go.
+  void forget(const std::string& path) { bytes -= std::min(bytes, bytes_at(path)); }
 };
 
 Recordings::Recordings(const asio::any_io_executor& executor, const Config& config, DeviceRegistry& devices,
-                       ValueClients& clients)
-    : executor_(executor), config_(config), devices_(devices), clients_(clients), timer_(executor) {}
+                       ValueClients& clients, Workers& workers)
+    : executor_(executor), config_(config), devices_(devices), clients_(clients), workers_(workers), timer_(executor) {}
 
 Recordings::~Recordings() {
   stop();
@@ -160,21 +113,85 @@ void Recordings::follow_config() {
     const bool is_wanted = std::find(wishes.begin(), wishes.end(), run->wish) != wishes.end();
     if (run->folder != config_.recordings.folder || (run->info.is_standing && !is_wanted)) end_run(*run, std::nullopt);
   }
-  begin_standing();
-  wait();
+  next_standing_ = steady_clock::now();
+  timer_.cancel();
+  wake();
 }
 
-void Recordings::begin_standing() {
-  next_standing_ = steady_clock::now() + standing_period;
-  std::string problem;
+bool Recordings::has_work() const {
+  const auto is_under_way = [](const auto& each) { return each.second->writer != nullptr; };
+  return !is_stopped_ &&
+         (!config_.recordings.standing.empty() || std::any_of(runs_.begin(), runs_.end(), is_under_way));
+}
+
+void Recordings::wake() {
+  if (is_looked_after_ || !has_work()) return;
+  is_looked_after_ = true;
+  asio::co_spawn(executor_, look_after(this, life_), asio::detached);
+}
+
+rr::awaitable<Recordings::Folder> Recordings::look(Workers& workers, std::string folder, std::string recording) {
+  const auto work = [&folder, &recording] { return Folder(look_into(folder, recording)); };
+  co_return co_await workers.run(work);
+}
+
+/// Whoever waits here may find that `self` has gone.
+rr::awaitable<void> Recordings::look_after(Recordings* self, std::weak_ptr<int> life) {
+  while (!life.expired() && self->has_work()) {
+    auto folder = co_await look(self->workers_, self->config_.recordings.folder);
+    if (life.expired()) co_return;
+    if (self->is_stopped_) break;
+    self->tick(folder);
+    if (steady_clock::now() >= self->next_standing_) {
+      self->next_standing_ = steady_clock::now() + standing_period;
+      const auto missing = self->missing_standing();
+      std::set<std::string> under_way;
+      for (const auto& [name, run] : self->runs_)
+        if (run->writer) under_way.insert(name);
+      const auto limits = self->config_.recordings;
+      const auto work = [&missing, &under_way, &limits] {
+        std::vector<Paths> rings;
+        for (const auto& wish : missing) rings.push_back(find_ring(limits.folder, wish, limits.standing, under_way));
+        return rings;
+      };
+      auto rings = co_await self->workers_.run(work);
+      if (life.expired()) co_return;
+      if (self->is_stopped_) break;
+      const bool is_same_folder = limits.folder == self->config_.recordings.folder;
+      if (is_same_folder) self->begin_standing(missing, std::move(rings), folder);
+    }
+    self->timer_.expires_after(steady_clock::now() < self->next_standing_ ? look_period : std::chrono::seconds(0));
+    co_await self->timer_.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
+  if (!life.expired()) self->is_looked_after_ = false;
+}
+
+std::vector<RecordingWish> Recordings::missing_standing() const {
+  std::vector<RecordingWish> out;
   for (const auto& wish : config_.recordings.standing) {
     const auto is_it = [&](const auto& each) {
       return each.second->writer && each.second->info.is_standing && each.second->wish == wish;
     };
-    if (std::any_of(runs_.begin(), runs_.end(), is_it)) continue;
+    if (std::none_of(runs_.begin(), runs_.end(), is_it)) out.push_back(wish);
+  }
+  return out;
+}
+
+void Recordings::begin_standing(const std::vector<RecordingWish>& missing, std::vector<Paths> rings, Folder& folder) {
+  std::string problem;
+  const auto& wanted = config_.recordings.standing;
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    const auto& wish = missing[i];
+    if (std::find(wanted.begin(), wanted.end(), wish) == wanted.end()) continue;  // not any more
     forget_ended(&wish);
-    if (const auto begun = begin_run(wish, true); !begun)
-      problem += (problem.empty() ? "" : "; ") + wish.device + ": " + begun.error().message;
+    auto& ring = rings[i];
+    for (std::error_code error; !ring.empty() && folder.bytes >= config_.recordings.max_bytes; ring.pop_front()) {
+      folder.forget(ring.front());
+      fs::remove(ring.front(), error);
+    }
+    auto begun = folder.bytes < config_.recordings.max_bytes ? begin_run(wish, &ring)
+                                                             : folder_is_full(config_.recordings.max_bytes);
+    if (!begun) problem += (problem.empty() ? "" : "; ") + wish.device + ": " + begun.error().message;
   }
   if (std::exchange(standing_problem_, problem) != problem && !problem.empty())
     log(LogLevel::error, "recordings can't begin", {{"error", problem}});
@@ -195,17 +212,26 @@ void Recordings::forget_ended(const RecordingWish* failed) {
   }
 }
 
-rr::Result<std::string> Recordings::begin(const RecordingWish& wish) {
-  const auto is_of_clients = [](const auto& each) { return each.second->writer && !each.second->info.is_standing; };
-  if (static_cast<std::size_t>(std::count_if(runs_.begin(), runs_.end(), is_of_clients)) >= config_.recordings.at_once)
-    return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "there are " + std::to_string(config_.recordings.at_once) + " recordings under way already");
-  auto begun = begin_run(wish, false);
-  wait();
-  return begun;
+std::size_t Recordings::count_of_clients() const {
+  return static_cast<std::size_t>(
+      std::count_if(runs_.begin(), runs_.end(), [](const auto& each) { return each.second->is_of_client(); }));
 }
 
-rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, bool is_standing) {
+rr::awaitable<rr::Result<std::string>> Recordings::begin(RecordingWish wish) {
+  const auto folder = co_await look(workers_, config_.recordings.folder);
+  const auto& limits = config_.recordings;
+  if (is_stopped_) co_return rr::make_error(rr::ErrorCode::operation_cancelled, "the gateway stops");
+  if (count_of_clients() >= limits.at_once)
+    co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                             "there are " + std::to_string(limits.at_once) + " recordings under way already");
+  const auto room = room_for_clients(folder);
+  if (!limits.folder.empty() && folder.bytes >= room) co_return no_room_for_clients(room, limits.max_bytes);
+  auto begun = begin_run(wish, nullptr);
+  wake();
+  co_return begun;
+}
+
+rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, Paths* ring) {
   const auto& limits = config_.recordings;
   if (limits.folder.empty())
     return rr::make_error(rr::ErrorCode::invalid_state, "the gateway has no \"recordings\" in its configuration");
@@ -216,34 +242,32 @@ rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, bool is
   };
   if (wish.service.empty() || !std::all_of(wish.service.begin(), wish.service.end(), is_name_char))
     return rr::make_error(rr::ErrorCode::invalid_argument, rr::quote(wish.service) + " is no name of a service");
-  if (used_bytes() >= limits.max_bytes)
-    return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "recordings have taken all that they may, " + std::to_string(limits.max_bytes) + " bytes");
   auto run = std::make_unique<Run>();
   run->wish = wish;
   run->folder = limits.folder;
   run->info.device = wish.device;
   run->info.service = wish.service;
-  run->info.is_standing = is_standing;
+  run->info.is_standing = ring != nullptr;
   std::error_code error;
   fs::create_directories(run->folder, error);  // creating the file says what is wrong
+  fs::path path;
   auto time = SystemClock::now();
   do {  // files that are there stay
-    run->info.name = wish.device + "." + wish.service + "." + name_of_time(time);
+    run->info.name = format_recording_name({wish.device, wish.service, time});
     run->info.begin = time;
+    path = fs::path(run->folder) / first_file_of(run->info.name);
     time += std::chrono::milliseconds(1);
-  } while (runs_.contains(run->info.name) ||
-           fs::exists(fs::path(run->folder) / (run->info.name + std::string(extension)), error));
+  } while (runs_.contains(run->info.name) || fs::exists(path, error));
   RecordingOptions how;
   how.max_bytes = wish.max_file_bytes;
   how.kept_files = static_cast<std::uint32_t>(wish.kept_files);
   how.library = "rrgate " + std::string(version);
-  auto writer =
-      RecordingWriter::create((fs::path(run->folder) / (run->info.name + std::string(extension))).string(), how);
-  if (!writer) {
-    fs::remove(fs::path(run->folder) / (run->info.name + std::string(extension)), error);
-    return writer.error();
+  if (ring) {
+    how.ring = ring_of(wish);
+    how.former = std::move(*ring);
   }
+  auto writer = RecordingWriter::create(path.string(), std::move(how));
+  if (!writer) return writer.error();
   run->writer = std::make_unique<RecordingWriter>(std::move(*writer));
 
   const auto name = run->info.name;
@@ -262,6 +286,7 @@ rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, bool is
     raw->info.problem = problem;
     log(LogLevel::warning, "recording has a problem", {{"recording", raw->info.name}, {"problem", problem}});
   };
+  listener.solved = [raw = run.get()](const std::string& left) { raw->info.problem = left; };
   listener.failed = fail_later;
   const RecorderOptions options{wish.members, wish.interval};
   run->recorder = std::make_shared<DeviceRecorder>(device->shared_from_this(), wish.service, clients_, *run->writer,
@@ -297,39 +322,68 @@ void Recordings::end_run(Run& run, std::optional<rr::Error> failure) {
   log(LogLevel::info, "recording ended", {{"recording", run.info.name}, {"messages", *run.info.messages}});
 }
 
-void Recordings::wait() {
-  const auto is_under_way = [](const auto& each) { return each.second->writer != nullptr; };
-  const bool has_work = !config_.recordings.standing.empty() || std::any_of(runs_.begin(), runs_.end(), is_under_way);
-  if (is_stopped_ || is_waiting_ || !has_work) return;
-  is_waiting_ = true;
-  timer_.expires_after(std::chrono::seconds(1));
-  timer_.async_wait([this, life = std::weak_ptr(life_)](const auto& error) {
-    if (life.expired()) return;
-    is_waiting_ = false;
-    if (error) return;
-    tick();
-    wait();
-  });
+std::uint64_t Recordings::room_for_clients(const Folder& folder) const {
+  const std::uint64_t most = config_.recordings.max_bytes;
+  const auto tenth = most / 10;
+  std::uint64_t reserved = 0;
+  for (const auto& [name, run] : runs_) {
+    if (!run->writer || !run->info.is_standing) continue;
+    if (run->wish.kept_files == 0) {  // what it will take is not known
+      reserved += tenth;
+      continue;
+    }
+    auto taken = folder.bytes_at(run->writer->path());
+    for (const auto& path : run->writer->kept()) taken += folder.bytes_at(path);
+    const auto wanted = static_cast<std::uint64_t>(run->wish.kept_files) * run->wish.max_file_bytes;
+    reserved += wanted - std::min(wanted, taken);
+  }
+  return most - std::min(reserved, most - tenth);
+}
+
+void Recordings::make_room(Folder& folder, std::uint64_t limit, bool is_standing) {
+  for (auto& [name, run] : runs_) {
+    if (!run->writer || run->info.is_standing != is_standing) continue;
+    while (folder.bytes >= limit && !run->writer->kept().empty()) {
+      folder.forget(run->writer->kept().front());
+      run->writer->drop_oldest();
+    }
+  }
+}
+
+/// Clients' recordings leave room to those of the configuration, and the largest of them leaves some to the others.
+std::optional<rr::Error> Recordings::end_of(const Run& run, const Folder& folder, std::uint64_t room) const {
+  const auto& limits = config_.recordings;
+  if (run.info.is_standing && folder.bytes >= limits.max_bytes) return folder_is_full(limits.max_bytes);
+  if (run.is_of_client()) {
+    if (folder.bytes >= room) return no_room_for_clients(room, limits.max_bytes);
+    const auto clients = count_of_clients();
+    const auto taken = folder.bytes_of(run.info.name);
+    if (clients > 1 && folder.bytes >= room - room / 10 && taken > room / clients)
+      return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                            "the recording has " + std::to_string(taken) + " bytes of the " + std::to_string(room) +
+                                " that " + std::to_string(clients) +
+                                " recordings of clients share: the others need the rest");
+  }
+  if (!devices_.has(run.recorder->device()))
+    return rr::make_error(rr::ErrorCode::resource_not_found, "the device has left the gateway");
+  return std::nullopt;
 }
 
 /// What waits for its chunk reaches the file, so that a gateway that is killed loses a second at most.
-void Recordings::tick() {
+void Recordings::tick(Folder& folder) {
+  const auto room = room_for_clients(folder);
+  make_room(folder, room, false);
+  make_room(folder, config_.recordings.max_bytes, true);
   const auto now = steady_clock::now();
-  const bool is_full = used_bytes() >= config_.recordings.max_bytes;
   for (auto& [name, run] : runs_) {
     if (!run->writer) continue;
     if (const auto flushed = run->writer->flush(); !flushed)
       end_run(*run, flushed.error());
-    else if (is_full)
-      end_run(*run, rr::make_error(rr::ErrorCode::out_of_system_resource,
-                                   "recordings have taken all that they may, " +
-                                       std::to_string(config_.recordings.max_bytes) + " bytes"));
-    else if (!devices_.has(run->recorder->device()))
-      end_run(*run, rr::make_error(rr::ErrorCode::resource_not_found, "the device has left the gateway"));
+    else if (auto why = end_of(*run, folder, room))
+      end_run(*run, std::move(why));
     else if (run->over && now >= *run->over)
       end_run(*run, std::nullopt);
   }
-  if (now >= next_standing_) begin_standing();
 }
 
 void Recordings::stop() {
@@ -341,30 +395,32 @@ void Recordings::stop() {
 
 rr::Result<> Recordings::end(std::string_view name) {
   const auto found = runs_.find(name);
-  if (found == runs_.end()) return find(name) ? rr::Result<>() : no_such_recording(name);
-  auto& run = *found->second;
-  if (!run.writer) return {};
-  if (run.info.is_standing)
+  if (found == runs_.end() || !found->second->writer) return {};
+  if (found->second->info.is_standing)
     return rr::make_error(rr::ErrorCode::invalid_state, "the configuration wants this recording");
-  end_run(run, std::nullopt);
+  end_run(*found->second, std::nullopt);
   return {};
 }
 
-rr::Result<> Recordings::remove(std::string_view name) {
-  const auto info = find(name);
-  if (!info) return no_such_recording(name);
+rr::awaitable<rr::Result<>> Recordings::remove(std::string name) {
+  const auto folder = co_await look(workers_, config_.recordings.folder, name);
+  const auto info = info_of(name, folder);
+  if (!info) co_return no_such_recording(name);
   if (const auto run = runs_.find(name); run != runs_.end()) {
     if (run->second->writer)
-      return rr::make_error(rr::ErrorCode::invalid_state, "the recording is under way; stop it first");
+      co_return rr::make_error(rr::ErrorCode::invalid_state, "the recording is under way; stop it first");
     runs_.erase(run);
   }
-  for (const auto& file : info->files) {
-    std::error_code error;
-    fs::remove(path_of(file), error);
-    if (error)
-      return rr::make_error(rr::ErrorCode::system_resource_error, "delete " + file.name + ": " + error.message());
-  }
-  return {};
+  const auto work = [files = info->files, where = config_.recordings.folder]() -> rr::Result<> {
+    for (const auto& file : files) {
+      std::error_code error;
+      fs::remove(fs::path(where) / file.name, error);
+      if (error)
+        return rr::make_error(rr::ErrorCode::system_resource_error, "delete " + file.name + ": " + error.message());
+    }
+    return {};
+  };
+  co_return co_await workers_.run(work);
 }
 
 // --- what there is ---
@@ -373,42 +429,61 @@ std::string Recordings::path_of(const RecordingFile& file) const {
   return (fs::path(config_.recordings.folder) / file.name).string();
 }
 
-std::uint64_t Recordings::used_bytes() const {
-  std::uint64_t out = 0;
-  for (const auto& [name, files] : look_into(config_.recordings.folder))
-    for (const auto& found : files) out += found.file.bytes;
+std::optional<RecordingInfo> Recordings::info_of(const std::string& name, const Folder& folder) const {
+  const auto files = folder.files.find(name);
+  const auto run = runs_.find(name);
+  RecordingInfo out;
+  if (run != runs_.end()) {
+    out = run->second->info;
+  } else {
+    auto said = files == folder.files.end() ? std::nullopt : parse_recording_name(name);
+    if (!said) return std::nullopt;
+    out.name = name;
+    out.device = std::move(said->device);
+    out.service = std::move(said->service);
+    out.begin = out.end = said->begin;
+  }
+  if (files != folder.files.end()) out.files = files->second;
+  if (run == runs_.end())
+    for (const auto& file : out.files) out.end = std::max(out.end, file.written);
+  if (run == runs_.end() || !run->second->writer) return out;
+  out.state = run->second->recorder->is_following() ? RecordingState::recording : RecordingState::waiting;
+  out.end = SystemClock::now();
+  out.messages = run->second->writer->message_count();
   return out;
 }
 
-std::vector<RecordingInfo> Recordings::list() const {
-  std::map<std::string, RecordingInfo> found;
-  for (auto& [name, files] : look_into(config_.recordings.folder)) {
-    auto& info = found[name] = *parse_recording_name(name);
-    for (auto& each : files) {
-      info.end = std::max(info.end, each.file.written);
-      info.files.push_back(std::move(each.file));
-    }
-  }
-  for (const auto& [name, run] : runs_) {
-    auto files = std::move(found[name].files);
-    auto& info = found[name] = run->info;
-    info.files = std::move(files);
-    if (!run->writer) continue;
-    info.state = run->recorder->is_following() ? RecordingState::recording : RecordingState::waiting;
-    info.end = SystemClock::now();
-    info.messages = run->writer->message_count();
-  }
+rr::awaitable<std::vector<RecordingInfo>> Recordings::list(AccessStatePtr rights, Identity who) {
   std::vector<RecordingInfo> out;
-  out.reserve(found.size());
-  for (auto& [name, info] : found) out.push_back(std::move(info));
+  if (!rights->rules.gives_any(who, Verb::record)) co_return out;
+  const auto folder = co_await look(workers_, config_.recordings.folder);
+  std::set<std::string> names;
+  for (const auto& [name, files] : folder.files) names.insert(name);
+  for (const auto& [name, run] : runs_) names.insert(name);
+  for (const auto& name : names)
+    if (auto info = info_of(name, folder); info && rights->rules.check(who, wanted_of(*info)))
+      out.push_back(std::move(*info));
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.begin > b.begin; });
-  return out;
+  co_return out;
 }
 
-std::optional<RecordingInfo> Recordings::find(std::string_view name) const {
-  for (auto& info : list())
-    if (info.name == name) return info;
-  return std::nullopt;
+rr::awaitable<std::optional<RecordingInfo>> Recordings::find(std::string name) {
+  const auto folder = co_await look(workers_, config_.recordings.folder, name);
+  co_return info_of(name, folder);
+}
+
+rr::awaitable<rr::Result<RecordingInfo>> Recordings::find_for(Access& access, Identity who, std::string name) {
+  AccessRequest wanted{.verb = Verb::record};
+  const auto said = parse_recording_name(name);
+  if (said) {
+    wanted.device = said->device;
+    wanted.service = said->service;
+  }
+  if (const auto allowed = access.check(who, wanted); !allowed) co_return allowed.error();
+  if (!said) co_return no_such_recording(name);
+  auto found = co_await find(name);
+  if (!found) co_return no_such_recording(name);
+  co_return std::move(*found);
 }
 
 }  // namespace rrgate

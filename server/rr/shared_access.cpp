@@ -25,8 +25,6 @@ Verb verb_of(rr::EntryType type, const rr::MemberDefinition* member) {
     case rr::EntryType::wire_connect_req:
     case rr::EntryType::wire_disconnect_req:
       return member ? verb_to_connect(*member) : Verb::subscribe;
-    case rr::EntryType::client_session_op_req:
-      return Verb::lock;
     default:
       return Verb::read;
   }
@@ -129,6 +127,7 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   const auto service = wanted.path.substr(0, wanted.path.find('.'));
   if (service == rr::service_index_name) return {};  // it tells each client what that may know
   if (!wanted.member && is_about_service(wanted.type)) return admit_to_service(asker, wanted, service);
+  if (wanted.type == rr::EntryType::client_session_op_req) return {};
   AccessRequest request;
   const auto device = node_.device_of(service);
   request.device = device;
@@ -138,6 +137,15 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   request.verb = verb_of(wanted.type, wanted.member);
   request.is_shape = wanted.type == rr::EntryType::memory_get_param;
   return asker.check(request, recorded_of(wanted.type));
+}
+
+rr::Result<> SessionRights::admit_lock(std::string_view path, const rr::AuthenticatedUser* user, Recorded recorded) {
+  if (access_.is_open() && !access_.audit().is_used()) return {};
+  AccessRequest request{.path = path, .verb = Verb::lock};
+  request.service = path.substr(0, path.find('.'));
+  const auto device = node_.device_of(request.service);
+  request.device = device;
+  return standing_of(user).check(request, recorded);
 }
 
 AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string_view>
 
 #include "core/session/service/service_session.hpp"
 #include "server/access/standing.hpp"
@@ -16,12 +17,15 @@ class SessionRights {
   SessionRights(Access& access, const SharedNode& node, std::string device, StandingPtr shown)
       : access_(access), node_(node), device_(std::move(device)), shown_(std::move(shown)) {}
 
-  /// For ServiceSessionOptions::admit. Errors   permission_denied; authentication_error: a login may help.
+  /// For ServiceSessionOptions::admit, but for requests of locks and leases, which may be to give something back: see
+  /// admit_lock(). Errors   permission_denied; authentication_error: a login may help.
   [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted);
   /// What is to be recorded of something that was admitted; see Access::begin().
   AuditEntryPtr begin(const rr::MemberAccess& admitted);
   /// Of what was admitted, but asked for too often.
   void record_too_much(const rr::MemberAccess& admitted, std::string_view why);
+  /// Whether the client may lock an object. Errors   permission_denied.
+  [[nodiscard]] rr::Result<> admit_lock(std::string_view path, const rr::AuthenticatedUser* user, Recorded recorded);
   AuditEntryPtr begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user);
   bool has_role(std::string_view role, const rr::AuthenticatedUser* user) {
     return standing_of(user).identity().has_role(role);

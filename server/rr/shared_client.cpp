@@ -59,6 +59,9 @@ void SharedClient::review() {
     home_->leave_pipe(*this, id);
     close_pipe(id);
   }
+  if (!service_ || !rights_.admit) return;
+  home_->review_locks(
+      *this, [this](const std::string& path) { return rights_.admit(path, session_.user(), false).has_value(); });
 }
 
 bool SharedClient::handle_event(rr::Now) {
@@ -389,6 +392,14 @@ void SharedClient::handle(const rr::UserChanged&) {
 
 // --- locks ---
 
+rr::Result<> SharedClient::admit_lock(const rr::LockWanted& wanted) {
+  const bool gives_back = wanted.command == rr::LockCommand::unlock ||
+                          wanted.command == rr::LockCommand::exit_monitor ||
+                          wanted.command == rr::LockCommand::release_lease;
+  if (!rights_.admit || (gives_back && home_->has_lock(*this, wanted.path))) return {};
+  return rights_.admit(wanted.path, session_.user(), true);
+}
+
 void SharedClient::begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done) {
   const bool is_recorded =
       wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;
@@ -403,13 +414,11 @@ void SharedClient::ask_for_lease(rr::LockCommand command, const std::string& pat
                                  std::function<void(const rr::Result<>&)> done) {
   if (!service_ || !rr::is_within(path, service_->name()))
     return done(rr::make_error(rr::ErrorCode::object_not_found, "the session has no object " + rr::quote(path)));
-  if (!session_.admits(rr::EntryType::client_session_op_req, path, nullptr))
-    return done(
-        rr::make_error(rr::ErrorCode::permission_denied, "who has opened the session may not lock " + rr::quote(path)));
   rr::LockWanted wanted;
   wanted.command = command;
   wanted.path = path;
   wanted.timeout = deadman;
+  if (const auto admitted = admit_lock(wanted); !admitted) return done(admitted);
   begin_lock(wanted, std::move(done));
 }
 
@@ -423,6 +432,8 @@ AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
 
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
+  if (const auto admitted = admit_lock(wanted); !admitted)
+    return session_.answer_lock(wanted.id, admitted, rr::read_clocks());
   begin_lock(wanted, while_here([this, id = wanted.id](const rr::Result<>& result) {
                session_.answer_lock(id, result, rr::read_clocks());
              }));

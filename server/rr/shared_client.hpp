@@ -30,6 +30,9 @@ class SharedClientOwner {
 
 /// What a session asks the gateway's access about locks. `user`  who has logged in; null: nobody.
 struct LockRights {
+  /// Whether it may be done; none: it may. Errors   permission_denied. `is_asked`  by the client: refusals are
+  /// recorded.
+  std::function<rr::Result<>(std::string_view path, const rr::AuthenticatedUser* user, bool is_asked)> admit;
   /// What is to be recorded of a lock, or of a lease's end (release_lease). None: nothing.
   std::function<AuditEntryPtr(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user)> begin;
   /// None: nobody has one.
@@ -52,7 +55,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   /// Does something about a lease, as if the client had asked for it here. `done`  is called once, maybe at once.
   void ask_for_lease(rr::LockCommand command, const std::string& path, std::chrono::milliseconds deadman,
                      std::function<void(const rr::Result<>&)> done);
-  /// Closes the wires and pipes that the client may not have any more: rights have changed, or who has logged in.
+  /// Closes the wires and pipes that the client may not have any more, and gives back what it may not lock: rights have
+  /// changed, or who has logged in.
   void review();
   /// Tells the client that its service ends, then closes.
   void close_service();
@@ -127,6 +131,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
   void leave_login();
+  /// What is the client's own it may give back, whatever its rights are by now.
+  rr::Result<> admit_lock(const rr::LockWanted& wanted);
   void begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
   void end_too_slow(const rr::Error& error);
   /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.

@@ -17,7 +17,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, Targ
   if (!member.is_generator())
     refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
   auto arguments = arguments_of(*request, *target, place_.form);
-  const auto id = reserve(*request);
+  const auto reserved = reserve(*request);
   Generator generator{target, target->client->next_generator()};
   auto opening = target->request(rr::CallKind::generator_open);
   opening.generator = generator.id;
@@ -29,29 +29,31 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, Targ
     error = exception.error();
   }
   if (error) {
-    open_.erase(id);
+    drop_open(reserved);
     throw rr::Exception(*error);
   }
-  if (is_stopped_) {  // nobody will close it
+  auto* open = find_open(reserved);
+  if (!open) {  // nobody will close it
     target->client->drop_generator(generator.id);
-    co_return nullptr;
+    refuse(rr::ErrorCode::operation_cancelled, "it was ended before it was open");
   }
-  open_[id] = std::move(generator);
+  open->what = std::move(generator);
   co_return nullptr;
 }
 
-JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& request) {
+JsonOperations::Step JsonOperations::generator_of(const JsonRequest& request) {
   const auto found = open_.find(request.at("generator").dump());
-  auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second);
+  const auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second.what);
   if (!generator) refuse(rr::ErrorCode::invalid_argument, "\"generator\" is not the id of one that is open");
-  return *generator;
+  return {*generator, {found->first, found->second.opening.token()}};
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, TargetPtr) {
-  const auto [target, generator] = generator_of(*request);
+  const auto [generator, reserved] = generator_of(*request);
+  const auto target = generator.target;
   value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
   auto step = target->request(rr::CallKind::generator_next);
-  step.generator = generator;
+  step.generator = generator.id;
   if (takes_values(*target->member)) {
     const auto& taken = target->member->parameters.back();
     step.arguments.push_back(value_of(*request, *target, taken.type, taken.name, place_.form));
@@ -66,7 +68,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
   auto out = rr::OrderedJson::object();
   if (error) {
     const bool has_ended = error->code == rr::ErrorCode::stop_iteration;
-    if (has_ended || error->code == rr::ErrorCode::operation_aborted) open_.erase(request->at("generator").dump());
+    if (has_ended || error->code == rr::ErrorCode::operation_aborted) drop_open(reserved);
     if (!has_ended) throw rr::Exception(*error);
     rr::add_key(out, "done") = true;
     co_return out;
@@ -77,10 +79,11 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(JsonRequestPtr request, rr::CallKind how) {
-  const auto [target, generator] = generator_of(*request);
-  open_.erase(request->at("generator").dump());
+  const auto [generator, reserved] = generator_of(*request);
+  const auto target = generator.target;
+  drop_open(reserved);
   auto end = target->request(how);
-  end.generator = generator;
+  end.generator = generator.id;
   co_await target->client->ask(std::move(end));
   co_return nullptr;
 }

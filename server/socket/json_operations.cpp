@@ -1,8 +1,10 @@
 #include "server/socket/json_operations.hpp"
 
 #include <algorithm>
+#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/large_json.hpp"
@@ -17,6 +19,10 @@ namespace {
 
 /// Requests that are not answered yet.
 constexpr std::size_t max_running = 64;  ///< and as many that are urgent
+/// Packets that wait for those before them. Where there are so many, the socket is not read for so long; a device that
+/// takes none meanwhile must not keep the gateway from reading what stops it.
+constexpr std::size_t max_packets = 1024;
+constexpr std::chrono::milliseconds longest_pause{100};
 
 /// What has ended a request: also what is nobody's intention, as a lack of memory, whose text is not for the client.
 rr::Error error_of(const std::exception_ptr& thrown) {
@@ -54,7 +60,7 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"read", Verb::read, &JsonOperations::pass_on<&read_memory>},
     {"write", Verb::write, &JsonOperations::pass_on<&write_memory>},
     {"lock", Verb::lock, &JsonOperations::pass_on<&lock_object>, {.needs_own = true}},
-    {"unlock", Verb::lock, &JsonOperations::pass_on<&unlock_object>, {.needs_own = true}},
+    {"unlock", Verb::lock, &JsonOperations::pass_on<&unlock_object>, {.needs_own = true, .gives_back = true}},
     {"lease", Verb::lock, &JsonOperations::pass_on<&lease_object>, {.needs_own = true}},
     {"renew",
      Verb::lock,
@@ -63,8 +69,8 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"release",
      Verb::lock,
      &JsonOperations::pass_on<&release_lease>,
-     {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
-    {"login", Verb::read, &JsonOperations::login, {.has_target = false, .keeps_order = true}},
+     {.needs_own = true, .gives_back = true, .is_free = true, .recorded = Recorded::never}},
+    {"login", Verb::read, &JsonOperations::login, {.has_target = false, .comes_first = true}},
 };
 
 const JsonOperations::Operation* JsonOperations::find_operation(std::string_view name) {
@@ -77,7 +83,8 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway),
       place_(std::move(place)),
       outbox_(std::move(outbox)),
-      questions_(place_.device->executor(), place_.form, outbox_) {}
+      questions_(place_.device->executor(), place_.form, outbox_),
+      sent_(place_.device->executor()) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const bool is_large = message.size() > large_json_bytes;
@@ -108,6 +115,10 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   const bool passes = operation && is_urgent(*request, *operation);
+  if (operation && operation->traits.keeps_order && !passes) {
+    co_await queue(request, std::move(memory));
+    co_return;
+  }
   if (running_ >= (passes ? 2 * max_running : max_running))
     co_return tell_error(request->id(),
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
@@ -124,11 +135,44 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     held = std::move(*entered);
   }
   ++running_;
-  if (operation && operation->traits.keeps_order)
+  if (operation && operation->traits.comes_first)
     co_await run(shared_from_this(), request, std::move(held), std::move(memory));
   else
     asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(held), std::move(memory)),
                    asio::detached);
+}
+
+rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::Charge memory) {
+  for (;;) {
+    const auto end_of_pause = last_sent_ + longest_pause;
+    if (packets_.size() < max_packets || is_stopped_ || std::chrono::steady_clock::now() >= end_of_pause) break;
+    sent_.expires_at(end_of_pause);
+    co_await sent_.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
+  if (is_stopped_) co_return;
+  if (packets_.size() >= max_packets)
+    co_return tell_error(request->id(), rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                                       std::to_string(packets_.size()) +
+                                                           " packets wait to be sent already, and the device takes "
+                                                           "none; wait for the answers"));
+  packets_.push_back({std::move(request), std::move(memory)});
+  if (packets_.size() > 1) co_return;
+  last_sent_ = std::chrono::steady_clock::now();
+  asio::co_spawn(place_.device->executor(), send_queued(shared_from_this()), asio::detached);
+}
+
+rr::awaitable<void> JsonOperations::send_queued(std::shared_ptr<JsonOperations> self) {
+  auto& packets = self->packets_;
+  while (!packets.empty()) {
+    const auto request = packets.front().request;
+    const Passes none;
+    ++self->running_;
+    co_await run(self, request, none, std::move(packets.front().memory));
+    packets.pop_front();
+    if (self->is_stopped_) packets.clear();
+    self->last_sent_ = std::chrono::steady_clock::now();
+    self->sent_.cancel();
+  }
 }
 
 bool JsonOperations::is_urgent(const JsonRequest& request, const Operation& operation) const {
@@ -191,6 +235,7 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
   auto used = co_await client();
   LookJudge may_look = [standing = place_.standing](const AccessRequest& object) { return standing->check(object); };
   auto target = value_or_throw(co_await find_target(used, segments, std::move(may_look)));
+  if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
@@ -210,13 +255,14 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
     }
     target->client = own_;
   }
-  if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   co_return target;
 }
 
 AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
   auto wanted = access_request(target, operation.verb);
   wanted.is_shape = operation.traits.asks_shape;
+  if (operation.traits.gives_back && target.client->has_lock(target.path()))
+    return operation.traits.recorded == Recorded::never ? nullptr : place_.standing->begin(wanted, operation.name);
   auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,
                                                 operation.verb == Verb::lock ? operation.name : std::string_view());
   if (begun) return std::move(*begun);
@@ -240,15 +286,18 @@ void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
 
 void JsonOperations::stop() {
   is_stopped_ = true;
+  sent_.cancel();
   for (auto& [id, open] : std::exchange(open_, {}))
-    if (const auto* generator = std::get_if<Generator>(&open)) generator->target->client->drop_generator(generator->id);
+    if (const auto* generator = std::get_if<Generator>(&open.what))
+      generator->target->client->drop_generator(generator->id);
   senders_.clear();
   questions_.end_all();
-  own_.reset();
+  // Not when the last request that is under way lets go of it: the device may take long to answer that.
+  if (const auto own = std::exchange(own_, nullptr)) own->leave();
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::login(JsonRequestPtr request, TargetPtr) {
-  if (own_ || !open_.empty() || running_ > 1)
+  if (own_ || !open_.empty() || !packets_.empty() || running_ > 1)
     refuse(rr::ErrorCode::invalid_operation, "\"login\" comes first: others are under way, or something is open");
   auto key = place_.key;
   key.username = request->text("username", "");

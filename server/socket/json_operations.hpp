@@ -1,6 +1,9 @@
 // What a client of a JSON WebSocket asks for, and what is open for it. Layer: server/socket. See docs/http-api.md.
 #pragma once
 
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -31,9 +34,10 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
  public:
   JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox);
 
-  /// Does what one message asks for. Waits for what has to keep its order; the rest goes on beside it.
+  /// Begins what one message asks for, and waits for a login alone: what a device does not answer stops no message
+  /// behind it, which may be to stop the device. Packets are sent one after the other.
   rr::awaitable<void> take(const std::string& message);
-  /// Ends subscriptions and callbacks that the client has no right to any more.
+  /// Ends subscriptions and callbacks that the client has no right to any more, and gives back what it may not lock.
   void review();
   /// Ends what is open. What is under way ends by itself, and answers nobody.
   void stop();
@@ -43,7 +47,9 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   struct Traits {
     bool has_target = true;    ///< the request names an object or a member by its path
     bool needs_own = false;    ///< to be a client of its own
-    bool keeps_order = false;  ///< the next message waits for it
+    bool keeps_order = false;  ///< goes behind those before it that do
+    bool comes_first = false;  ///< the next message waits for it
+    bool gives_back = false;   ///< what is the client's own: needs no right
     bool asks_shape = false;   ///< see AccessRequest::is_shape
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
     Recorded recorded = Recorded::each_time;
@@ -67,12 +73,29 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     TargetPtr target;
     rr::GeneratorId id = 0;
   };
-  struct Opening {};
-  using Open = std::variant<Opening, Subscription, Generator>;
+  struct Pending {};
+  struct Open {
+    explicit Open(std::shared_ptr<JsonOutbox> outbox) : opening(std::move(outbox)) {}
+
+    JsonOpening opening;
+    std::variant<Pending, Subscription, Generator> what;
+  };
+  /// An id, and which of all that have it one after the other.
+  struct Reserved {
+    std::string id;
+    JsonOutbox::Token token = 0;
+  };
+  struct Packet {
+    JsonRequestPtr request;
+    MemoryBudget::Charge memory;
+  };
 
   using Passes = std::shared_ptr<const HttpAccess::Passes>;
   static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request, Passes passes,
                                  MemoryBudget::Charge memory);
+  /// Sends a packet behind those that wait, or refuses it where too many do.
+  rr::awaitable<void> queue(JsonRequestPtr request, MemoryBudget::Charge memory);
+  static rr::awaitable<void> send_queued(std::shared_ptr<JsonOperations> self);
   rr::awaitable<rr::OrderedJson> perform(JsonRequestPtr request);
   rr::awaitable<TargetPtr> find(JsonRequestPtr request, const Operation& operation);
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
@@ -97,10 +120,19 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<rr::OrderedJson> login(JsonRequestPtr request, TargetPtr);
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
-  std::string reserve(const JsonRequest& request);
-  /// Keeps what a reserved id has opened. Throws   rr::Exception: it could not be opened; the id is free again.
-  void keep(const std::string& id, rr::Result<ValueClient::ListenerPtr> listener, const Target& target);
-  Generator& generator_of(const JsonRequest& request);
+  Reserved reserve(const JsonRequest& request);
+  /// Null: it was ended meanwhile, and the id may be another one's.
+  Open* find_open(const Reserved& reserved);
+  /// The id is free again, unless it is another one's.
+  void drop_open(const Reserved& reserved);
+  /// Keeps what a reserved id has opened. Throws   rr::Exception: it could not be opened, and the id is free again; or
+  /// it was ended meanwhile.
+  void keep(const Reserved& reserved, rr::Result<ValueClient::ListenerPtr> listener, const Target& target);
+  struct Step {
+    Generator generator;
+    Reserved reserved;
+  };
+  Step generator_of(const JsonRequest& request);
   rr::awaitable<rr::OrderedJson> end_generator(JsonRequestPtr request, rr::CallKind how);
 
   GatewayState& gateway_;
@@ -110,6 +142,9 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   std::map<std::string, Open> open_;
   std::map<std::pair<std::string, std::string>, ValueClient::ListenerPtr> senders_;  ///< hold what is sent on
   JsonQuestions questions_;
+  std::deque<Packet> packets_;  ///< that wait; the first one is on its way
+  std::chrono::steady_clock::time_point last_sent_;
+  boost::asio::steady_timer sent_;  ///< cancelled when a packet was sent
   std::size_t running_ = 0;
   bool is_stopped_ = false;
 };

@@ -1,5 +1,7 @@
 #include "server/socket/json_outbox.hpp"
 
+#include <utility>
+
 namespace rrgate {
 
 namespace {
@@ -12,39 +14,74 @@ constexpr std::size_t write_bytes = 64u * 1024;
 
 }  // namespace
 
+JsonOutbox::Token JsonOutbox::begin() {
+  opened_[++last_token_] = waiting_.end();
+  return last_token_;
+}
+
+void JsonOutbox::forget(Token of) {
+  drop_newest(of);
+  opened_.erase(of);
+  count();
+}
+
 void JsonOutbox::add(std::string text) {
   if (is_closed_) return;
   const auto bytes = bytes_ + text.size();
-  const bool is_full =
-      bytes > max_outbox_bytes || waiting_.size() >= max_waiting_messages || !memory_.resize(in_flight_ + bytes);
+  const bool is_full = bytes > max_outbox_bytes || waiting_.size() >= max_waiting_messages ||
+                       !memory_.resize(in_flight_ + kept_bytes_ + bytes);
   if (is_full && !waiting_.empty()) {
-    waiting_.clear();
-    newest_.clear();
+    clear();
     has_overflown_ = is_closed_ = true;
     text = R"({"error":{"name":"RobotRaconteur.OutOfSystemResource",)"
            R"("message":"too slow: messages were lost, so the connection ends"}})";
-    bytes_ = 0;
   }
   bytes_ += text.size();
-  memory_.hold(in_flight_ + bytes_);
-  waiting_.push_back({std::move(text), {}});
+  count();
+  waiting_.push_back({std::move(text), 0, 0, nullptr});
   news_.cancel();
 }
 
-void JsonOutbox::add_newest(const std::string& name, std::function<std::string()> text) {
-  if (is_closed_) return;
-  const auto [place, is_new] = newest_.insert_or_assign(name, std::move(text));
-  if (!is_new) return;
-  waiting_.push_back({{}, name});
-  news_.cancel();
+void JsonOutbox::add(Token of, std::string text) {
+  if (!opened_.contains(of)) return;
+  drop_newest(of);
+  add(std::move(text));
+}
+
+void JsonOutbox::add_newest(Token of, std::size_t bytes, std::function<std::string()> text) {
+  const auto opened = opened_.find(of);
+  if (is_closed_ || opened == opened_.end()) return;
+  auto& at = opened->second;
+  const bool is_new = at == waiting_.end();
+  if (is_new) at = waiting_.insert(waiting_.end(), Entry{{}, of, 0, nullptr});
+  kept_bytes_ += bytes - std::exchange(at->kept_bytes, bytes);
+  at->newest = std::move(text);
+  count();
+  if (is_new) news_.cancel();
+}
+
+void JsonOutbox::drop_newest(Token of) {
+  const auto opened = opened_.find(of);
+  if (opened == opened_.end() || opened->second == waiting_.end()) return;
+  kept_bytes_ -= opened->second->kept_bytes;
+  waiting_.erase(std::exchange(opened->second, waiting_.end()));
+}
+
+void JsonOutbox::clear() {
+  for (auto& [token, at] : opened_) at = waiting_.end();
+  waiting_.clear();
+  bytes_ = kept_bytes_ = 0;
+}
+
+/// In any case: it is there already.
+void JsonOutbox::count() {
+  memory_.hold(in_flight_ + kept_bytes_ + bytes_);
 }
 
 void JsonOutbox::close() {
   is_closed_ = true;
-  waiting_.clear();
-  newest_.clear();
-  bytes_ = 0;
-  memory_.hold(in_flight_);
+  clear();
+  count();
   news_.cancel();
 }
 
@@ -54,23 +91,24 @@ std::vector<std::string> JsonOutbox::take() {
   while (!waiting_.empty() && taken < write_bytes) {
     auto entry = std::move(waiting_.front());
     waiting_.pop_front();
-    if (entry.name.empty()) {
+    if (entry.of != 0) {
+      opened_[entry.of] = waiting_.end();
+      kept_bytes_ -= entry.kept_bytes;
+      out.push_back(entry.newest());
+    } else {
       bytes_ -= entry.text.size();
       out.push_back(std::move(entry.text));
-    } else {
-      const auto found = newest_.extract(entry.name);
-      out.push_back(found.mapped()());
     }
     taken += out.back().size();
   }
   in_flight_ = taken;
-  memory_.hold(in_flight_ + bytes_);
+  count();
   return out;
 }
 
 void JsonOutbox::note_sent() {
   in_flight_ = 0;
-  memory_.hold(bytes_);
+  count();
 }
 
 }  // namespace rrgate

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
-#include <deque>
+#include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,13 +18,24 @@ namespace rrgate {
 /// wire's values only the newest waits. For the thread of the executor.
 class JsonOutbox {
  public:
+  /// Names what a client has opened, whatever else has had its id before, or has it later.
+  using Token = std::uint64_t;
+
   /// `memory`  is where what waits is counted.
   JsonOutbox(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory)
       : memory_(std::move(memory)), news_(executor) {}
 
+  /// What is opened may have messages, until forget().
+  Token begin();
+  /// Nothing of it is taken any more, and no value of it waits.
+  void forget(Token of);
+
   void add(std::string text);
-  /// Takes the place of the message that waits under the same name; `text` is asked for when it is sent.
-  void add_newest(const std::string& name, std::function<std::string()> text);
+  /// A message of what was opened. A value that waits is dropped: it would come to be after this, once it is replaced.
+  void add(Token of, std::string text);
+  /// A wire's value. It takes the place of one that waits, and `text` is asked for when it is sent. `bytes`  that
+  /// `text` keeps until then.
+  void add_newest(Token of, std::size_t bytes, std::function<std::string()> text);
   /// Nothing more is taken.
   void close();
 
@@ -38,17 +51,41 @@ class JsonOutbox {
  private:
   struct Entry {
     std::string text;
-    std::string name;  ///< of what is asked for when it is sent; empty: text is there
+    Token of = 0;  ///< whose newest value is asked for when it is sent; 0: text is there
+    std::size_t kept_bytes = 0;
+    std::function<std::string()> newest;
   };
+  using Entries = std::list<Entry>;
+
+  void drop_newest(Token of);
+  void clear();
+  void count();
 
   MemoryBudget::Charge memory_;
-  std::deque<Entry> waiting_;
-  std::map<std::string, std::function<std::string()>> newest_;
-  std::size_t bytes_ = 0;      ///< of the texts
-  std::size_t in_flight_ = 0;  ///< of what was taken last
+  Entries waiting_;
+  std::map<Token, Entries::iterator> opened_;  ///< and where the newest value waits; the end: none does
+  Token last_token_ = 0;
+  std::size_t bytes_ = 0;       ///< of the texts
+  std::size_t kept_bytes_ = 0;  ///< of values whose text is not there yet
+  std::size_t in_flight_ = 0;   ///< of what was taken last
   bool has_overflown_ = false;
   bool is_closed_ = false;
   boost::asio::steady_timer news_;
+};
+
+/// What a client has opened at an outbox, for as long as this lives.
+class JsonOpening {
+ public:
+  explicit JsonOpening(std::shared_ptr<JsonOutbox> outbox) : outbox_(std::move(outbox)), token_(outbox_->begin()) {}
+  ~JsonOpening() { outbox_->forget(token_); }
+  JsonOpening(const JsonOpening&) = delete;
+  JsonOpening& operator=(const JsonOpening&) = delete;
+
+  JsonOutbox::Token token() const { return token_; }
+
+ private:
+  std::shared_ptr<JsonOutbox> outbox_;
+  JsonOutbox::Token token_;
 };
 
 }  // namespace rrgate

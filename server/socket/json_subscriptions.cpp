@@ -31,15 +31,24 @@ std::string value_news(const std::string& id, const Sample& sample, const Target
 
 }  // namespace
 
-std::string JsonOperations::reserve(const JsonRequest& request) {
+JsonOperations::Reserved JsonOperations::reserve(const JsonRequest& request) {
   const auto& id = request.id();
   if (id == "null") refuse(rr::ErrorCode::invalid_argument, "what stays open is named by its \"id\": it needs one");
   if (open_.contains(id)) refuse(rr::ErrorCode::invalid_argument, "the id " + id + " names something that is open");
   if (open_.size() >= max_open)
     refuse(rr::ErrorCode::out_of_system_resource,
            "this WebSocket has " + std::to_string(max_open) + " subscriptions, generators and callbacks already");
-  open_[id] = Opening{};
-  return id;
+  const auto made = open_.try_emplace(id, outbox_).first;
+  return {id, made->second.opening.token()};
+}
+
+JsonOperations::Open* JsonOperations::find_open(const Reserved& reserved) {
+  const auto found = open_.find(reserved.id);
+  return found != open_.end() && found->second.opening.token() == reserved.token ? &found->second : nullptr;
+}
+
+void JsonOperations::drop_open(const Reserved& reserved) {
+  if (find_open(reserved)) open_.erase(reserved.id);
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request, TargetPtr target) {
@@ -49,45 +58,44 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request,
   const auto* after = request->find("after");
   if (after && !after->is_number_unsigned())
     refuse(rr::ErrorCode::invalid_argument, "\"after\" is the number of an event");
-  const auto id = reserve(*request);
+  const auto reserved = reserve(*request);
   const auto told = std::make_shared<Target>(*target);
   told->client.reset();  // it would keep itself
-  SampleHandler handler = [outbox = outbox_, id, told, form = place_.form, memory = &gateway_.memory()](
-                              const SamplePtr& sample, const rr::Error* error) {
+  SampleHandler handler = [outbox = outbox_, id = reserved.id, token = reserved.token, told, form = place_.form,
+                           memory = &gateway_.memory()](const SamplePtr& sample, const rr::Error* error) {
     if (!sample) {
       auto out = rr::OrderedJson::object();
       rr::add_key(out, "state") = state_name(error);
       if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, told->types())["error"]["message"];
-      outbox->add(news_of(id, out));
+      outbox->add(token, news_of(id, out));
     } else if (told->member->kind == rr::MemberKind::wire) {
-      outbox->add_newest(id,
+      outbox->add_newest(token, sample->bytes,
                          [id, told, form, memory, sample] { return value_news(id, *sample, *told, form, *memory); });
     } else {
-      outbox->add(value_news(id, *sample, *told, form, *memory));
+      outbox->add(token, value_news(id, *sample, *told, form, *memory));
     }
   };
   auto place = target->place();
   const auto from = after ? after->get<std::uint64_t>() : 0;
   auto listening = co_await target->client->listen(std::move(place), from, std::move(handler));
-  keep(id, std::move(listening), *target);
+  keep(reserved, std::move(listening), *target);
   co_return nullptr;
 }
 
-void JsonOperations::keep(const std::string& id, rr::Result<ValueClient::ListenerPtr> listener, const Target& target) {
-  if (listener && !is_stopped_ && open_.contains(id)) {
-    open_[id] = Subscription{std::move(*listener), target.path(), target.member->name};
-    return;
-  }
-  open_.erase(id);
-  value_or_throw(std::move(listener));
+void JsonOperations::keep(const Reserved& reserved, rr::Result<ValueClient::ListenerPtr> listener,
+                          const Target& target) {
+  auto* open = find_open(reserved);
+  if (!listener) drop_open(reserved);
+  auto kept = value_or_throw(std::move(listener));
+  if (!open) refuse(rr::ErrorCode::operation_cancelled, "it was ended before it was open");
+  open->what = Subscription{std::move(kept), target.path(), target.member->name};
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(JsonRequestPtr request, TargetPtr) {
   const auto found = open_.find(request->at("subscription").dump());
-  if (found == open_.end() || std::holds_alternative<Generator>(found->second))
+  if (found == open_.end() || std::holds_alternative<Generator>(found->second.what))
     refuse(rr::ErrorCode::invalid_argument, "\"subscription\" is not the id of one that is open");
-  const auto gone = std::move(found->second);
-  open_.erase(found);
+  const auto gone = open_.extract(found);
   co_return nullptr;
 }
 
@@ -115,7 +123,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(JsonRequestPtr request, Targ
 
 void JsonOperations::review() {
   for (auto it = open_.begin(); it != open_.end();) {
-    const auto* open = std::get_if<Subscription>(&it->second);
+    const auto* open = std::get_if<Subscription>(&it->second.what);
     rr::Result<> allowed;
     if (open)
       allowed = place_.standing->check({.device = place_.device->config().name,
@@ -132,19 +140,26 @@ void JsonOperations::review() {
     auto news = rr::OrderedJson::object();
     rr::add_key(news, "state") = "ended";
     rr::add_key(news, "detail") = allowed.error().message;
-    outbox_->add(news_of(it->first, news));
+    outbox_->add(it->second.opening.token(), news_of(it->first, news));
     it = open_.erase(it);
   }
+  if (!own_) return;
+  const auto own = own_;
+  own->review_locks([this](const std::string& path) {
+    const AccessRequest wanted{
+        .device = place_.device->config().name, .service = place_.key.service, .path = path, .verb = Verb::lock};
+    return place_.standing->check(wanted, Recorded::never).has_value();
+  });
 }
 
 // --- the device asks ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, TargetPtr target) {
   expect_member(*target, "callback", {rr::MemberKind::callback});
-  const auto id = reserve(*request);
+  const auto reserved = reserve(*request);
   const auto asked = std::make_shared<Target>(*target);
   asked->client.reset();
-  rr::ClientConnection::LateCallbackHandler handler = [weak = weak_from_this(), id, asked](
+  rr::ClientConnection::LateCallbackHandler handler = [weak = weak_from_this(), id = reserved.id, asked](
                                                           std::span<const rr::Value> arguments, const auto& reply) {
     if (const auto self = weak.lock())
       self->questions_.ask(id, asked, arguments, reply);
@@ -152,7 +167,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, 
       reply(client_gone());
   };
   auto answering = target->client->answer_callback(target->place(), std::move(handler));
-  keep(id, std::move(answering), *target);
+  keep(reserved, std::move(answering), *target);
   co_return nullptr;
 }
 

@@ -1,7 +1,6 @@
 #include "server/state/agent_sessions.hpp"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 namespace rrgate {
@@ -13,32 +12,20 @@ std::shared_ptr<AgentCommand> AgentSession::begin_command(AgentCommand command) 
 }
 
 AgentSessionPtr AgentSessions::visit(const std::string& key, const std::string& user, const std::string& client) {
-  auto& session = sessions_[key];
-  if (session) {
-    session->used = std::chrono::steady_clock::now();
-    return session;
+  if (auto known = sessions_.visit(key)) {
+    known->has_ended = false;
+    return known;
   }
-  session = std::make_shared<AgentSession>();
-  session->user = user;
-  session->client = client;
-  auto made = session;
-  if (sessions_.size() > most_sessions) {
-    const auto rank = [&](const auto& each) {
-      return std::tuple(each.second == made, each.second->commands > 0, each.second->used);
-    };
-    sessions_.erase(std::min_element(sessions_.begin(), sessions_.end(),
-                                     [&](const auto& a, const auto& b) { return rank(a) < rank(b); }));
-  }
-  return made;
+  sessions_.make_room(most_sessions);
+  return sessions_.add(key, {.user = user, .client = client});
 }
 
 void AgentSessions::end(const std::string& key) {
-  if (const auto found = sessions_.find(key); found != sessions_.end()) found->second->has_ended = true;
+  if (const auto found = sessions_.find(key)) found->has_ended = true;
 }
 
 std::vector<AgentSessionPtr> AgentSessions::list() const {
-  std::vector<AgentSessionPtr> out;
-  for (const auto& [key, session] : sessions_) out.push_back(session);
+  auto out = sessions_.all();
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a->used > b->used; });
   return out;
 }

@@ -4,10 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "server/state/agent_table.hpp"
 
 namespace rrgate {
 
@@ -38,6 +40,10 @@ struct AgentSession {
   std::deque<std::shared_ptr<AgentCommand>> last_commands = {};  ///< the oldest first
 
   std::shared_ptr<AgentCommand> begin_command(AgentCommand command);
+
+  // For AgentTable.
+  auto rank() const { return std::pair(commands > 0, used); }
+  bool is_held() const { return false; }
 };
 using AgentSessionPtr = std::shared_ptr<AgentSession>;
 
@@ -46,7 +52,7 @@ class AgentSessions {
  public:
   static constexpr std::size_t most_sessions = 64;
 
-  /// `key`  nobody else's.
+  /// `key`  nobody else's. A session that had ended goes on.
   AgentSessionPtr visit(const std::string& key, const std::string& user, const std::string& client);
   /// It stays in the list.
   void end(const std::string& key);
@@ -54,7 +60,7 @@ class AgentSessions {
   std::vector<AgentSessionPtr> list() const;
 
  private:
-  std::map<std::string, AgentSessionPtr> sessions_;
+  AgentTable<AgentSession> sessions_;
 };
 
 }  // namespace rrgate

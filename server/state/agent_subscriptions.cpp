@@ -1,33 +1,22 @@
 #include "server/state/agent_subscriptions.hpp"
 
-#include <algorithm>
-#include <utility>
-
 namespace rrgate {
 
-rr::Result<std::shared_ptr<AgentSubscriptions::Session>> AgentSubscriptions::find_or_make(const std::string& session) {
-  const auto now = std::chrono::steady_clock::now();
-  if (const auto found = sessions_.find(session); found != sessions_.end()) {
-    found->second->used = now;
-    return found->second;
-  }
-  if (sessions_.size() >= most_sessions) {
-    const auto oldest = std::min_element(sessions_.begin(), sessions_.end(), [](const auto& a, const auto& b) {
-      return std::pair(a.second->streams, a.second->used) < std::pair(b.second->streams, b.second->used);
-    });
-    if (oldest->second->streams > 0)
-      return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                            std::to_string(most_sessions) + " sessions have streams, which is all that there may be");
-    sessions_.erase(oldest);
-  }
-  auto made = std::make_shared<Session>();
-  made->used = now;
-  sessions_[session] = made;
-  return made;
+rr::Result<AgentSubscriptions::SessionPtr> AgentSubscriptions::find_or_make(const std::string& session,
+                                                                            const std::string& owner) {
+  if (auto known = sessions_.visit(session)) return known;
+  const auto too_many = [](std::size_t most, const std::string& whose) {
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          std::to_string(most) + " sessions" + whose + " have streams, which is all that there may be");
+  };
+  if (!sessions_.make_room(most_of_owner, [&](const Session& other) { return other.owner == owner; }))
+    return too_many(most_of_owner, " of " + rr::quote(owner));
+  if (!sessions_.make_room(most_sessions)) return too_many(most_sessions, "");
+  return sessions_.add(session, {.owner = owner});
 }
 
-rr::Result<> AgentSubscriptions::add(const std::string& session, const std::string& uri) {
-  const auto found = find_or_make(session);
+rr::Result<> AgentSubscriptions::add(const std::string& session, const std::string& owner, const std::string& uri) {
+  const auto found = find_or_make(session, owner);
   if (!found) return found.error();
   auto& uris = (*found)->uris;
   if (uris.size() >= most_resources && !uris.contains(uri))
@@ -39,15 +28,16 @@ rr::Result<> AgentSubscriptions::add(const std::string& session, const std::stri
 
 void AgentSubscriptions::remove(const std::string& session, const std::string& uri) {
   const auto found = sessions_.find(session);
-  if (found != sessions_.end() && found->second->uris.erase(uri) > 0) ++found->second->changes;
+  if (found && found->uris.erase(uri) > 0) ++found->changes;
 }
 
 void AgentSubscriptions::end(const std::string& session) {
   sessions_.erase(session);
 }
 
-rr::Result<std::unique_ptr<AgentSubscriptions::Stream>> AgentSubscriptions::open_stream(const std::string& session) {
-  const auto found = find_or_make(session);
+rr::Result<std::unique_ptr<AgentSubscriptions::Stream>> AgentSubscriptions::open_stream(const std::string& session,
+                                                                                        const std::string& owner) {
+  const auto found = find_or_make(session, owner);
   if (!found) return found.error();
   return std::make_unique<Stream>(*found);
 }

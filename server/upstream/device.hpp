@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -72,6 +73,8 @@ class Device : public std::enable_shared_from_this<Device> {
   const Retry& retry() const { return retry_; }
   /// Of one service, for all sessions that the gateway has with it.
   std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
+  /// Keeps the locks of a service that nobody uses, as long as they owe the device what makes it safe.
+  void keep_owing(std::shared_ptr<ServiceLocks> locks) { owing_.insert(std::move(locks)); }
   /// The same for all services that clients use now, by their names.
   std::map<std::string, std::shared_ptr<ServiceLocks>> locks() const;
   /// Told when a lease of one of its objects begins and ends.
@@ -152,7 +155,8 @@ class Device : public std::enable_shared_from_this<Device> {
   std::string last_error_;
   std::optional<ProbeResult> identity_;
   std::map<std::string, std::weak_ptr<ServiceLocks>> locks_;  ///< by service
-  std::map<std::string, std::weak_ptr<Upstream>> shared_;     ///< likewise
+  std::set<std::shared_ptr<ServiceLocks>> owing_;
+  std::map<std::string, std::weak_ptr<Upstream>> shared_;  ///< likewise
   std::size_t clients_ = 0;
   std::size_t closing_ = 0;
   Traffic traffic_;

@@ -9,6 +9,8 @@ namespace rrgate {
 namespace {
 
 constexpr std::size_t max_leases = 1024;
+/// Of one client, with those that it has lost and not released: nobody can take all of them from the others.
+constexpr std::size_t max_leases_of_client = 128;
 
 rr::Error kept_by(const HeldLease& lease) {
   return rr::make_error(rr::ErrorCode::object_locked_error,
@@ -29,6 +31,14 @@ std::vector<LeaseTable::Leases::iterator> LeaseTable::others_around(LockClient c
   return out;
 }
 
+std::size_t LeaseTable::count_besides(LockClient client, std::string_view key) const {
+  const auto is_other = [&](const auto& lease) { return lease.second.holder == client && !overlap(key, lease.first); };
+  auto out = static_cast<std::size_t>(std::count_if(leases_.begin(), leases_.end(), is_other));
+  for (auto lost = lost_.lower_bound({client, ""}); lost != lost_.end() && lost->first.first == client; ++lost)
+    if (!overlap(key, lost->first.second)) ++out;
+  return out;
+}
+
 rr::Result<> LeaseTable::acquire(LockClient client, const Subject& by, std::string_view path, milliseconds deadman,
                                  bool takes_over, rr::TimePoint now) {
   if (deadman < shortest_deadman || deadman > longest_deadman)
@@ -42,11 +52,15 @@ rr::Result<> LeaseTable::acquire(LockClient client, const Subject& by, std::stri
     if (lease.holder == client && known != key && overlap(known, key))
       return rr::make_error(rr::ErrorCode::invalid_operation,
                             "this client has the lease of " + rr::quote(known) + " already: release it first");
-  if (leases_.size() + lost_.size() >= max_leases)
+  if (count_besides(client, key) >= max_leases_of_client)
     return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "too many leases are held, or were lost and not released");
+                          "this client has " + std::to_string(max_leases_of_client) +
+                              " leases, or has lost them and not released them: release some first");
   const auto others = others_around(client, key);
   if (!others.empty() && !takes_over) return kept_by(others.front()->second);
+  if (others.empty() && !leases_.contains(key) && leases_.size() >= max_leases)
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          std::to_string(max_leases) + " leases of this service are held already");
   for (const auto& other : others) end(other, "it was taken over by " + (by.is_nobody() ? "another client" : by.name));
   std::erase_if(lost_, [&](const auto& each) { return each.first.first == client && overlap(each.first.second, key); });
   auto& lease = leases_[key];
@@ -109,6 +123,12 @@ rr::Result<> LeaseTable::check_lock(LockClient client, std::string_view path, rr
   handle_timeout(now);
   const auto others = others_around(client, canonical_lock_path(path));
   return others.empty() ? rr::Result<>() : kept_by(others.front()->second);
+}
+
+bool LeaseTable::has_at(LockClient client, std::string_view path) const {
+  const auto key = canonical_lock_path(path);
+  const auto lease = leases_.find(key);
+  return lost_.contains({client, key}) || (lease != leases_.end() && lease->second.holder == client);
 }
 
 void LeaseTable::handle_gone(LockClient client) {

@@ -49,6 +49,9 @@ class LeaseTable {
   /// Whether a client may write or call something of an object now. `client`  0: one who can hold nothing.
   rr::Result<> check(LockClient client, std::string_view path, LeaseNeed need, rr::TimePoint now);
 
+  /// Whether a client has the lease of this object, or has lost it and not released it.
+  bool has_at(LockClient client, std::string_view path) const;
+
   // --- told ---
 
   void handle_gone(LockClient client);
@@ -75,6 +78,8 @@ class LeaseTable {
   using Leases = std::map<std::string, Lease, std::less<>>;
 
   void end(Leases::iterator at, const std::string& why);
+  /// Those that a client has, and has lost, without those of an object and above and below it.
+  std::size_t count_besides(LockClient client, std::string_view key) const;
   rr::Error not_held(LockClient client, const std::string& key) const;
   /// Those of other clients at, above and below an object.
   std::vector<Leases::iterator> others_around(LockClient client, std::string_view key);

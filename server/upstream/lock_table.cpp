@@ -194,6 +194,32 @@ void LockTable::handle_released(std::string_view path, rr::TimePoint) {
   }
 }
 
+void LockTable::handle_right_lost(LockClient client, std::string_view path, rr::TimePoint) {
+  const auto key = canonical_lock_path(path);
+  const std::string why = "the right to lock it is gone";
+  const rr::Error refused{rr::ErrorCode::permission_denied, why};
+  if (const auto found = locks_.find(key); found != locks_.end() && found->second.owner == client) {
+    auto& lock = found->second;
+    note_lost_lock(key, lock, why);
+    if (lock.asking == Asking::take) answer(std::exchange(lock.asker, 0), lock.request, refused);
+    // Another client may try to take it, and fail: then it is given back as that of one who has left.
+    take_back_lock(lock, lock.asking == Asking::override_it ? client : 0);
+  }
+  const auto found = monitors_.find(key);
+  if (found == monitors_.end()) return;
+  auto& monitor = found->second;
+  std::erase_if(monitor.queue, [&](const Waiting& waiting) {
+    if (waiting.client != client) return false;
+    answer(client, waiting.request, refused);
+    return true;
+  });
+  if (monitor.owner != client) return;
+  if (monitor.asking == Asking::take) answer(client, monitor.request, refused);
+  if (monitor.asking == Asking::give_back) return;
+  lose_monitor(monitor, why);
+  take_back_monitor(monitor, 0);
+}
+
 // --- object locks ---
 
 bool LockTable::owns(LockClient client, const Hold& lock) const {
@@ -477,6 +503,40 @@ rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_
     return invalid("the monitor lock of " + rr::quote(key) + " is not this client's any more: " + lost->second +
                    "; exit it, or enter it again");
   return {};
+}
+
+rr::Result<> LockTable::check_below(LockClient client, std::string_view path) const {
+  const auto key = canonical_lock_path(path);
+  const auto is_free = [&](const auto& held) -> rr::Result<> {
+    for (auto at = held.lower_bound(key + "."); at != held.end() && rr::is_within(at->first, key); ++at) {
+      const Hold& hold = at->second;
+      if (hold.owner == 0 || owns(client, hold)) continue;
+      return locked(rr::quote(at->first) + ", which is below, is locked by " +
+                    (hold.by.is_nobody() ? "another client" : hold.by.name));
+    }
+    return {};
+  };
+  if (auto allowed = is_free(locks_); !allowed) return allowed;
+  return is_free(monitors_);
+}
+
+std::vector<std::string> LockTable::paths_of(LockClient client) const {
+  std::vector<std::string> out;
+  for (const auto& [key, lock] : locks_)
+    if (lock.owner == client) out.push_back(key);
+  const auto is_his = [client](const Waiting& waiting) { return waiting.client == client; };
+  for (const auto& [key, monitor] : monitors_)
+    if (monitor.owner == client || std::any_of(monitor.queue.begin(), monitor.queue.end(), is_his)) out.push_back(key);
+  return out;
+}
+
+bool LockTable::has_at(LockClient client, std::string_view path) const {
+  const auto key = canonical_lock_path(path);
+  if (lost_locks_.contains({client, key}) || lost_monitors_.contains({client, key})) return true;
+  const auto lock = locks_.find(key);
+  const auto monitor = monitors_.find(key);
+  return (lock != locks_.end() && owns(client, lock->second)) ||
+         (monitor != monitors_.end() && monitor->second.owner == client);
 }
 
 std::optional<LockEvent> LockTable::poll_event() {

@@ -85,6 +85,8 @@ class LockTable {
   void handle_lost(LockSession session, rr::TimePoint now);
   /// The device has replaced the objects at and below a path: locks there are gone.
   void handle_released(std::string_view path, rr::TimePoint now);
+  /// A client may not lock an object any more: what it has there is given back, and it is refused until it unlocks.
+  void handle_right_lost(LockClient client, std::string_view path, rr::TimePoint now);
   void handle_timeout(rr::TimePoint now);
 
   // --- asked ---
@@ -93,6 +95,12 @@ class LockTable {
   /// `is_exempt`  the member is left alone by object locks (not by monitors).
   /// Errors   object_locked_error; invalid_operation: a monitor.
   rr::Result<> check(LockClient client, std::string_view path, bool is_exempt, rr::TimePoint now);
+  /// Whether nobody else has a lock or a monitor of something below an object. Errors   object_locked_error.
+  rr::Result<> check_below(LockClient client, std::string_view path) const;
+  /// Of the objects of which a client has a lock or a monitor, is about to, or waits for it. Canonical.
+  std::vector<std::string> paths_of(LockClient client) const;
+  /// Whether a client has one of this object, or has lost one and was not told so yet.
+  bool has_at(LockClient client, std::string_view path) const;
 
   // --- answers ---
 

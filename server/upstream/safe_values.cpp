@@ -5,6 +5,7 @@
 #include "core/session/service_path.hpp"
 #include "server/json/value_from_json.hpp"
 #include "server/log/log.hpp"
+#include "server/upstream/lock_table.hpp"
 #include "server/upstream/upstream.hpp"
 
 namespace rrgate {
@@ -58,8 +59,11 @@ rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDe
 
 SafeValues::SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions)
     : device_(std::move(device)) {
-  for (const auto& action : actions)
-    if (rr::is_within(action.path, service)) items_.push_back({action, misfit(action, "not checked yet")});
+  for (auto action : actions) {
+    if (!rr::is_within(action.path, service)) continue;
+    action.path = canonical_lock_path(action.path);  // as leases and locks know it
+    items_.push_back({action, misfit(action, "not checked yet")});
+  }
 }
 
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
@@ -123,6 +127,7 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
     if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
     return false;
   }
+  by->forget_commands(path);
   for (const auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.request) continue;
     by->make_safe(*item.request,

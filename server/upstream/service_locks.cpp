@@ -15,6 +15,18 @@ rr::TimePoint steady_now() {
   return std::chrono::steady_clock::now();
 }
 
+/// Sets a flag for as long as it lives.
+class Settling {
+ public:
+  explicit Settling(bool& flag) : flag_(flag) { flag_ = true; }
+  ~Settling() { flag_ = false; }
+  Settling(const Settling&) = delete;
+  Settling& operator=(const Settling&) = delete;
+
+ private:
+  bool& flag_;
+};
+
 /// Whether object locks leave it alone.
 bool is_exempt(const rr::MemberDefinition& member, MemberUse use) {
   return member.has_modifier("nolock") || (use == MemberUse::read && member.has_modifier("nolockread"));
@@ -43,11 +55,18 @@ void ServiceLocks::remove(const UpstreamClient& client, std::function<void()> le
     return;
   }
   const auto id = known.mapped();
-  std::erase_if(requests_, [id](const auto& request) { return request.first.first == id; });
+  const auto first = requests_.lower_bound({id, 0});
+  std::vector<std::function<void(const rr::Result<>&)>> open;
+  for (auto it = first; it != requests_.end() && it->first.first == id;) {
+    open.push_back(std::move(it->second));
+    it = requests_.erase(it);
+  }
   if (left) leaving_[id] = std::move(left);
   table_.remove(id, steady_now());
   leases_.handle_gone(id);
   settle();
+  const auto why = rr::make_error(rr::ErrorCode::invalid_operation, "the user has changed, or the client has left");
+  for (const auto& done : open) done(why);
 }
 
 void ServiceLocks::handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
@@ -60,6 +79,23 @@ void ServiceLocks::handle_wanted(const UpstreamClient& client, const rr::LockWan
   requests_[{known->second, wanted.id}] = std::move(done);
   table_.handle_wanted(known->second, wanted, steady_now());
   settle();
+}
+
+void ServiceLocks::review(const UpstreamClient& client, const std::function<bool(const std::string&)>& may_lock) {
+  const auto known = clients_.find(&client);
+  if (known == clients_.end()) return;
+  const auto id = known->second;
+  for (const auto& path : table_.paths_of(id))
+    if (!may_lock(path)) table_.handle_right_lost(id, path, steady_now());
+  for (const auto& lease : leases_.held())
+    if (lease.holder == id && !may_lock(lease.path))
+      leases_.handle_lost(lease.path, "its holder has no right to it any more");
+  settle();
+}
+
+bool ServiceLocks::has_at(const UpstreamClient& client, std::string_view path) const {
+  const auto known = clients_.find(&client);
+  return known != clients_.end() && (table_.has_at(known->second, path) || leases_.has_at(known->second, path));
 }
 
 rr::Result<> ServiceLocks::check(const UpstreamClient& client, std::string_view path,
@@ -117,6 +153,7 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
                             "this client has none of the roles that may take a lease over (\"takeover\")");
     if (auto fits = safe_->check(canonical_lock_path(wanted.path)); !fits) return fits;
     if (auto allowed = table_.check(id, wanted.path, false, now); !allowed) return allowed;
+    if (auto allowed = table_.check_below(id, wanted.path); !allowed) return allowed;
     result = leases_.acquire(id, client.lock_user(), wanted.path, wanted.timeout, takes_over, now);
   }
   end_leases();
@@ -199,8 +236,13 @@ void ServiceLocks::handle_released(std::string_view path) {
 }
 
 void ServiceLocks::settle() {
+  if (is_settling_) return;  // what is told to one brings more: whoever tells goes on with that, one after the other
   const auto self = shared_from_this();
-  while (auto event = table_.poll_event()) std::visit([this](auto& happened) { handle(std::move(happened)); }, *event);
+  {
+    const Settling settling(is_settling_);
+    while (auto event = table_.poll_event())
+      std::visit([this](auto& happened) { handle(std::move(happened)); }, *event);
+  }
   end_leases();
   const auto next = std::min(table_.poll_timeout(), leases_.poll_timeout());
   if (next == timeout_.expiry()) return;

@@ -44,9 +44,13 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void add(const UpstreamClient& client, Upstream& upstream);
   /// Gives back what it holds. `left`  is called once the device has it back, maybe at once.
   void remove(const UpstreamClient& client, std::function<void()> left = nullptr);
-  /// `done`  is called exactly once, unless the client is removed before.
+  /// `done`  is called exactly once; with invalid_operation where the client is removed before.
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
+  /// Gives back what the client has locked or leased, or waits for, where it may not lock any more.
+  void review(const UpstreamClient& client, const std::function<bool(const std::string& path)>& may_lock);
+  /// Whether the client has a lock, a monitor or a lease of this object, or has lost one and not given it back.
+  bool has_at(const UpstreamClient& client, std::string_view path) const;
   /// Whether the client may use a member now. Errors   those of LockTable::check() and LeaseTable::check().
   rr::Result<> check(const UpstreamClient& client, std::string_view path, const rr::MemberDefinition& member,
                      MemberUse use);
@@ -60,6 +64,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   /// Errors   not_implemented_error: none are declared; those of SafeValues::check(), where not all could be sent;
   /// connection_error: they are sent as soon as the device is back.
   rr::Result<> make_safe(std::string_view path);
+  /// Whether the device is still to be made safe, because it was away when a lease ended.
+  bool is_owing() const { return safe_->is_owing(); }
   /// Every lease ends, because the gateway or the device goes.
   void end_leases(const std::string& why);
   void handle_opened(const std::shared_ptr<Upstream>& upstream);
@@ -98,6 +104,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   std::map<std::pair<LockClient, rr::LockRequestId>, std::function<void(const rr::Result<>&)>> requests_;
   std::map<LockClient, std::function<void()>> leaving_;
   LockClient last_client_ = 0;
+  bool is_settling_ = false;
   boost::asio::steady_timer timeout_;
 };
 

@@ -57,6 +57,10 @@ Upstream::Upstream(std::shared_ptr<Device> device, std::string service, Upstream
       wake_(device_->executor()),
       attempted_(device_->executor(), asio::steady_timer::time_point::max()) {}
 
+Upstream::~Upstream() {
+  if (locks_->is_owing()) device_->keep_owing(locks_);
+}
+
 // --- clients ---
 
 void Upstream::add(UpstreamClient& client) {
@@ -66,6 +70,7 @@ void Upstream::add(UpstreamClient& client) {
 }
 
 void Upstream::change_user(UpstreamClient& client) {
+  if (!has(client)) return;  // it is leaving, and nobody would take it off again
   locks_->remove(client);
   locks_->add(client, *this);
 }
@@ -203,7 +208,9 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
 
 /// After the device has come back: what clients had found there, they have found again, or it is gone.
 void Upstream::look_up_again() {
-  const auto known = objects_;
+  auto known = objects_;
+  for (const auto& [key, wire] : wires_) known.insert(key.first);  // also where it was lost while it was looked for
+  for (const auto& [number, pipe] : pipes_) known.insert(pipe.path);
   for (const auto& path : known) {
     find_object(path, [weak = weak_from_this(), path](const rr::Result<rr::Value>& found) {
       const auto self = weak.lock();
@@ -254,6 +261,8 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   if (!ends_generator(called))
     if (const auto allowed = locks_->check(client, path, *called.member, use_of(called.kind)); !allowed)
       return done(allowed.error());
+  if (!connection_) return done(lost_error());  // a lease that has ended meanwhile had something sent
+  if (!has(client)) return done(rr::make_error(rr::ErrorCode::operation_cancelled, "the client has left"));
   if (!connection_->session().object_type(path)) {  // another session of this service has found it
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {
@@ -262,6 +271,8 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
       self->request(client, called, done);
     });
   }
+  // Whoever reads behind a command wants to know what has come of it, not what was asked for before.
+  if (use_of(called.kind) == MemberUse::command) reads_.clear();
   if (called.generator != 0) return answer_generator(client, called, path, std::move(done));
   if (called.kind == rr::CallKind::function) {
     const auto number = ++last_call_;
@@ -311,6 +322,14 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
     wire->second->out_value = OutValue{nullptr, request.values.front()};
 }
 
+void Upstream::forget_commands(std::string_view path) {
+  for (const auto& [key, wire] : wires_) {
+    if (!rr::is_within(key.first, path) || locks_->is_urgent(key.first, wire->member)) continue;
+    wire->out_value.reset();
+    if (connection_) connection_->drop_waiting_value(key.first, key.second);
+  }
+}
+
 void Upstream::send_safe(const SafeRequest& request, Completion done) {
   switch (request.kind) {
     case SafeAction::Kind::call:
@@ -324,15 +343,16 @@ void Upstream::send_safe(const SafeRequest& request, Completion done) {
 
 void Upstream::share_read(const std::string& path, const std::string& property, Completion done) {
   const MemberKey key(path, property);
-  auto& waiting = reads_[key];
-  waiting.push_back(std::move(done));
-  if (waiting.size() > 1) return;
-  connection_->get(path, property, [weak = weak_from_this(), key](const rr::Result<rr::Value>& value) {
+  auto& joinable = reads_[key];
+  if (joinable) return joinable->push_back(std::move(done));
+  const auto readers = joinable = std::make_shared<std::vector<Completion>>();
+  readers->push_back(std::move(done));
+  connection_->get(path, property, [weak = weak_from_this(), key, readers](const rr::Result<rr::Value>& value) {
     const auto self = weak.lock();
     if (!self) return;
-    const auto readers = self->reads_.extract(key);
-    if (!readers) return;
-    for (const auto& reader : readers.mapped()) reader(value);
+    if (const auto found = self->reads_.find(key); found != self->reads_.end() && found->second == readers)
+      self->reads_.erase(found);
+    for (const auto& reader : *readers) reader(value);
   });
 }
 
@@ -473,13 +493,17 @@ void Upstream::route_callback(const std::string& path, const rr::MemberDefinitio
       bool is_answered = false;
     };
     const auto votes = std::make_shared<Votes>(Votes{candidates.size()});
-    for (auto* client : candidates)
-      client->call_callback(path, callback, arguments, [votes, answer](const rr::Result<rr::Value>& vote) {
-        --votes->left;
-        if (votes->is_answered || (!vote && votes->left > 0)) return;
-        votes->is_answered = true;
-        answer(vote);
-      });
+    const auto take_vote = [votes, answer](const rr::Result<rr::Value>& vote) {
+      --votes->left;
+      if (votes->is_answered || (!vote && votes->left > 0)) return;
+      votes->is_answered = true;
+      answer(vote);
+    };
+    for (auto* client : candidates)  // one that is asked may end others
+      if (has(*client))
+        client->call_callback(path, callback, arguments, take_vote);
+      else
+        take_vote(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
     return;
   }
   const bool is_first = policy == CallbackPolicy::first && !candidates.empty();

@@ -100,6 +100,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
 
   Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login,
            UpstreamUse use = UpstreamUse::all_clients);
+  ~Upstream();
+  Upstream(const Upstream&) = delete;
+  Upstream& operator=(const Upstream&) = delete;
 
   /// Connects, and attaches again what clients had joined. Errors   those of reaching the device and of the login.
   rr::awaitable<rr::Result<>> open();
@@ -161,6 +164,13 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Of the client, not of the session: other clients are kept out by the gateway.
   void lock(UpstreamClient& client, const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
 
+  /// See ServiceLocks::review().
+  void review_locks(const UpstreamClient& client, const std::function<bool(const std::string&)>& may_lock) {
+    locks_->review(client, may_lock);
+  }
+  /// See ServiceLocks::has_at().
+  bool has_lock(const UpstreamClient& client, std::string_view path) const { return locks_->has_at(client, path); }
+
   /// The gateway stops, or shares the device no more: the device is made safe where a lease is held.
   void end_leases(const std::string& why) { locks_->end_leases(why); }
 
@@ -173,6 +183,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void ask_for_lock(rr::LockCommand command, const std::string& path, std::chrono::milliseconds timeout,
                     Completion done);
 
+  /// Drops what clients have sent to wires at and below a path and the device has not been sent yet: they command no
+  /// more. What passes all locks and leases stays.
+  void forget_commands(std::string_view path);
   /// Sent past whatever waits, and once more behind it where something waits.
   void make_safe(const SafeRequest& request, Completion done);
 
@@ -233,6 +246,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::optional<Outgoing> outgoing;   ///< while hand_out() is at it
     std::uint64_t count = 0;            ///< values that have come
     std::optional<OutValue> out_value;  ///< the newest that could not be sent yet
+    bool is_attaching = false;
     bool is_attached = false;
     bool is_due = false;  ///< hand_out() is due
   };
@@ -276,6 +290,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Until it is lost or closed; returns whether it has had no clients for too long instead.
   rr::awaitable<bool> watch_use();
   rr::awaitable<void> rest();
+  void disconnect_when_safe(const std::shared_ptr<rr::ClientConnection>& connection);
   /// Also while the session has ended, and says so next: what failed has failed by that.
   bool is_lost() const;
   void lost(const rr::Error& reason);
@@ -351,8 +366,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::uint64_t endpoints_left_ = 0;  ///< how many ever have: while none does, nobody has to be looked up in endpoints_
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
-  std::vector<OpenCall> calls_;                         ///< of functions, oldest first
-  std::map<MemberKey, std::vector<Completion>> reads_;  ///< where reads are shared: who waits for them
+  std::vector<OpenCall> calls_;  ///< of functions, oldest first
+  /// Where reads are shared: who waits for those that others may join.
+  std::map<MemberKey, std::shared_ptr<std::vector<Completion>>> reads_;
   std::uint64_t last_call_ = 0;
 };
 

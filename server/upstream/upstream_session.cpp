@@ -132,20 +132,22 @@ void Upstream::close(std::function<void()> closed) {
     if (closed) closed();
     return;
   }
-  // A device may drop with a session what it has not done yet: what makes it safe is answered first.
-  if (unanswered_->count > 0) {
-    const auto wait = std::make_shared<asio::steady_timer>(device_->executor(), longest_farewell);
-    wait->async_wait([connection, wait, unanswered = unanswered_](const rr::error_code&) {
-      unanswered->on_none = nullptr;
-      connection->disconnect();
-    });
-    unanswered_->on_none = [wait] { wait->cancel(); };
-  }
   connection->on_closed([until_known = device_->begin_closing(), closed = std::move(closed)](const rr::Error&) {
     if (closed) closed();
   });
-  if (unanswered_->count == 0) connection->disconnect();
+  disconnect_when_safe(connection);
   tell_lost(lost_error());
+}
+
+/// A device may drop with a session what it has not done yet: what makes it safe is answered first.
+void Upstream::disconnect_when_safe(const std::shared_ptr<rr::ClientConnection>& connection) {
+  if (unanswered_->count == 0) return connection->disconnect();
+  const auto wait = std::make_shared<asio::steady_timer>(device_->executor(), longest_farewell);
+  wait->async_wait([connection, wait, unanswered = unanswered_](const rr::error_code&) {
+    unanswered->on_none = nullptr;
+    connection->disconnect();
+  });
+  unanswered_->on_none = [wait] { wait->cancel(); };
 }
 
 void Upstream::keep_open(Retry retry, std::function<rr::Result<>()> is_used) {
@@ -206,7 +208,7 @@ rr::awaitable<bool> Upstream::watch_use() {
 }
 
 rr::awaitable<void> Upstream::rest() {
-  std::exchange(connection_, nullptr)->disconnect();
+  disconnect_when_safe(std::exchange(connection_, nullptr));
   is_resting_ = true;
   wake_.expires_at(asio::steady_timer::time_point::max());
   while (is_resting_ && !is_closed_) co_await wake_.async_wait(wait_token);
@@ -259,7 +261,7 @@ void Upstream::lost(const rr::Error& reason) {
   loss_ = reason;
   generators_.clear();
   for (const auto& [key, wire] : wires_) {
-    wire->is_attached = false;
+    wire->is_attached = wire->is_attaching = false;
     wire->newest.reset();  // no value of before is one of now
     wire->outgoing.reset();
     for (auto& follower : wire->followers) follower.count = wire->count;

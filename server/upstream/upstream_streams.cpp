@@ -24,9 +24,9 @@ constexpr std::size_t clients_a_turn = 64;
 // --- wires ---
 
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
-  if (!has(client)) return;  // it has left, and nobody would take it off again
   const auto allowed =
       connection_ ? locks_->check(client, path, member, MemberUse::connect) : rr::Result<>(lost_error());
+  if (!has(client)) return;  // it has left, and nobody would take it off again
   if (!allowed) {
     client.answer_wire(path, member, allowed.error());
     return client.close_wire(path, member);  // where it comes with the wire from another session
@@ -48,29 +48,38 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
 }
 
 void Upstream::attach_wire(const MemberKey& key) {
-  if (!connection_) return;
-  const auto weak = weak_from_this();
+  const auto known = wires_.find(key);
+  if (!connection_ || known == wires_.end() || known->second->is_attached || known->second->is_attaching) return;
+  // Who has joined may leave meanwhile, and another one join: that is another wire.
+  const auto is_there = [weak = weak_from_this(), key,
+                         wire = std::weak_ptr(known->second)]() -> std::shared_ptr<Upstream> {
+    auto self = weak.lock();
+    if (!self || self->is_lost()) return nullptr;
+    const auto found = self->wires_.find(key);
+    return found != self->wires_.end() && found->second == wire.lock() ? self : nullptr;
+  };
+  known->second->is_attaching = true;
   if (!connection_->session().object_type(key.first))  // another session of this service has found it
-    return find_object(key.first, [weak, key](const rr::Result<rr::Value>& found) {
-      const auto self = weak.lock();
-      if (!self || self->is_lost()) return;
+    return find_object(key.first, [is_there, key](const rr::Result<rr::Value>& found) {
+      const auto self = is_there();
+      if (!self) return;
+      self->wires_.at(key)->is_attaching = false;
       if (found) return self->attach_wire(key);
       const auto reason = found.error();
       self->drop_wire(key, &reason);
     });
+  const auto weak = weak_from_this();
   auto received = [weak, key](const rr::Value& value, rr::TimeSpec time) {
     if (const auto self = weak.lock()) self->publish_wire(key, value, time);
   };
-  auto connected = [weak, key](const rr::Result<rr::Value>& done) {
-    const auto self = weak.lock();
-    if (!self || self->is_lost()) return;
-    const auto found = self->wires_.find(key);
-    if (found == self->wires_.end()) return;
+  auto connected = [is_there, key](const rr::Result<rr::Value>& done) {
+    const auto self = is_there();
+    if (!self) return;
     if (!done) {
       const auto reason = done.error();
       return self->drop_wire(key, &reason);
     }
-    const auto wire = found->second;
+    const auto wire = self->wires_.at(key);
     wire->is_attached = true;
     const auto followers = wire->followers;
     for (const auto& follower : followers)
@@ -181,9 +190,9 @@ rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path
 
 void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
                          const rr::MemberDefinition& member) {
-  if (!has(client)) return;
   const auto allowed =
       connection_ ? locks_->check(client, path, member, MemberUse::connect) : rr::Result<>(lost_error());
+  if (!has(client)) return;
   if (!allowed) {
     client.refuse_pipe(id, allowed.error());
     return client.close_pipe(id);  // where it comes with the endpoint from another session
@@ -316,10 +325,15 @@ void Upstream::drop_pipe(PipeNumber number) {
 
 rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
                                  std::optional<std::uint32_t> wants_ack) {
-  const auto known = endpoints_.find({&client, id});
-  if (known == endpoints_.end()) return rr::make_error(rr::ErrorCode::invalid_operation, "the pipe is not connected");
+  const EndpointKey endpoint(&client, id);
+  const auto is_closed = rr::make_error(rr::ErrorCode::invalid_operation, "the pipe is not connected");
+  auto known = endpoints_.find(endpoint);
+  if (known == endpoints_.end()) return is_closed;
+  const auto& asked = pipes_.at(known->second);
+  const auto allowed = locks_->check_packet(client, asked.path, *asked.member);
+  known = endpoints_.find(endpoint);  // a lease that has ended meanwhile had something sent: the session may be lost
+  if (known == endpoints_.end()) return is_closed;
   auto& pipe = pipes_.at(known->second);
-  const auto allowed = locks_->check_packet(client, pipe.path, *pipe.member);
   auto sent = !allowed                                           ? allowed
               : pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
                                                                  : rr::Result<>(lost_error());

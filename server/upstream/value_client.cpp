@@ -19,6 +19,10 @@ constexpr std::size_t kept_event_bytes = 4u * 1024 * 1024;
 constexpr auto wait_for_news = asio::as_tuple(asio::use_awaitable);
 constexpr asio::use_awaitable_t<> await_result;
 
+rr::Error client_has_left() {
+  return rr::make_error(rr::ErrorCode::operation_cancelled, "the client has left");
+}
+
 /// Calls `begin(complete)` once it is awaited; `complete` takes a Result<Value>, whose error is thrown.
 template <class Begin>
 auto await_completion(asio::any_io_executor executor, Begin begin) {
@@ -42,6 +46,16 @@ ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Devic
 }
 
 ValueClient::~ValueClient() {
+  leave();
+}
+
+void ValueClient::leave() {
+  if (std::exchange(has_left_, true)) return;
+  for (auto& [key, topic] : topics_) {
+    topic.state = TopicState::idle;
+    topic.error = client_has_left();
+  }
+  changed_.cancel();
   upstream_->remove(*this);
 }
 
@@ -74,6 +88,7 @@ rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string 
   wanted.path = std::move(path);
   wanted.timeout = timeout;
   return await_completion(upstream_->device().executor(), [self = shared_from_this(), wanted](auto done) {
+    if (self->has_left_) return done(client_has_left());
     self->upstream_->lock(*self, wanted, [done](const rr::Result<>& result) {
       done(result ? rr::Result<rr::Value>(rr::Value()) : result.error());
     });
@@ -127,6 +142,7 @@ rr::awaitable<rr::Result<>> ValueClient::send(MemberPlace place, rr::Value value
 }
 
 rr::awaitable<rr::Result<>> ValueClient::join(Key key) {
+  if (has_left_) co_return client_has_left();
   const auto is_joining = [&] {
     const auto found = topics_.find(key);
     return found != topics_.end() && found->second.state == TopicState::joining;
@@ -357,7 +373,7 @@ rr::Result<std::shared_ptr<Upstream>> ValueClients::find_or_make(const std::shar
   if (const auto found = entries_.find(place); found != entries_.end()) {
     const auto upstream = found->second.upstream;
     if (&upstream->device() == device.get() && (!shared || shared == upstream)) return upstream;
-    entries_.erase(found);
+    close_unjudged(entries_.extract(found).mapped());
   }
   if (device->is_full()) return rr::make_error(rr::ErrorCode::out_of_system_resource, device->full_text());
   auto& entry = entries_[place];
@@ -410,9 +426,7 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::
   if (client) co_return client;
   // Who can't get in, for whatever reason, takes nobody's place.
   if (entry.client && entry.client->is_used()) co_return client;
-  const bool is_unused = entry.is_ours && !entry.client;
-  entries_.erase(found);
-  if (is_unused) upstream->close();
+  close_unjudged(entries_.extract(found).mapped());
   co_return client;
 }
 
@@ -427,8 +441,11 @@ void ValueClients::sweep() {
 void ValueClients::stop() {
   is_stopped_ = true;
   sweep_.disarm();
-  for (const auto& [place, entry] : std::exchange(entries_, {}))
-    if (entry.is_ours && !entry.client) entry.upstream->close();
+  for (const auto& [place, entry] : std::exchange(entries_, {})) close_unjudged(entry);
+}
+
+void ValueClients::close_unjudged(const Entry& entry) {
+  if (entry.is_ours && !entry.client) entry.upstream->close();
 }
 
 }  // namespace rrgate

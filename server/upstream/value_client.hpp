@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -56,6 +57,9 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   ValueClient& operator=(const ValueClient&) = delete;
 
   const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
+  /// Ends all that it has at the device, also where requests of it are under way: the device has its locks back, and is
+  /// made safe where it has held leases. From now on it is refused whatever it asks for.
+  void leave();
   /// Whether something goes on beyond a request.
   bool is_used() const { return !topics_.empty(); }
 
@@ -70,6 +74,12 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void drop_generator(rr::GeneratorId id) { upstream_->drop_generator(*this, id); }
   /// `timeout`  the dead-man's time, where a lease is asked for.
   rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path, std::chrono::milliseconds timeout = {});
+  /// Gives back what it has locked or leased where it may not any more.
+  void review_locks(const std::function<bool(const std::string& path)>& may_lock) {
+    upstream_->review_locks(*this, may_lock);
+  }
+  /// Whether it has a lock or a lease of this object, or has lost one and not given it back.
+  bool has_lock(std::string_view path) const { return upstream_->has_lock(*this, path); }
   /// Called when a lease of its own has ended, with the object's path and why.
   void on_lease_ended(std::function<void(const std::string& path, const std::string& why)> handler) {
     on_lease_ended_ = std::move(handler);
@@ -174,6 +184,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   std::uint64_t last_id_ = 0;
   rr::PipeId last_pipe_ = 0;
   rr::GeneratorId last_generator_ = 0;
+  bool has_left_ = false;
   boost::asio::steady_timer changed_;  ///< cancelled when a topic has been joined or not
 };
 
@@ -212,6 +223,8 @@ class ValueClients {
     std::chrono::steady_clock::time_point last_opened;
   };
   using Entries = std::map<std::pair<std::string, SessionKey>, Entry>;
+  /// Of one that is not wanted any more. An upstream with a client ends with that.
+  static void close_unjudged(const Entry& entry);
   rr::Result<std::shared_ptr<Upstream>> find_or_make(const std::shared_ptr<Device>& device, const SessionKey& key);
   /// The client of an entry whose session is open.
   rr::Result<std::shared_ptr<ValueClient>> let_in(Entry& entry, const SessionKey& key);

@@ -14,10 +14,8 @@ export interface Peer {
  * `more`: of its configuration in the gateway.
  */
 export async function startPeer(script: string, service: string, more: object = {}): Promise<Peer> {
-  const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
-  if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
   const port = await freePort();
-  const device = new Program(python, [path.join(repositoryRoot, script), String(port)]);
+  const device = pythonProgram(script, [String(port)]);
   device.start();
   await device.waitForOutput(/^ready$/m);
   const url = `rr+tcp://127.0.0.1:${port}/?service=${service}`;
@@ -27,4 +25,11 @@ export async function startPeer(script: string, service: string, more: object = 
     await device.kill();
   };
   return { url: gateway.url, device, stop };
+}
+
+/** `script`: in the repository. */
+export function pythonProgram(script: string, args: readonly string[]): Program {
+  const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
+  if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
+  return new Program(python, [path.join(repositoryRoot, script), ...args]);
 }

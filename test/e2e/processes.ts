@@ -1,5 +1,5 @@
 // Starts the programs under test and ends them; a test that kills a device starts it again on the same port.
-import { spawn } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import type { ChildProcess } from "node:child_process";
 import { randomInt } from "node:crypto";
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
@@ -78,6 +78,11 @@ export class Program {
   get output(): string {
     return this.#output;
   }
+
+  /** undefined: it does not run. */
+  get pid(): number | undefined {
+    return this.#child?.pid;
+  }
 }
 
 /** A gateway of its own to one device; `more`: of its configuration. */
@@ -107,6 +112,14 @@ export async function startGateway(
     await pause(100);
   }
   return { program, url };
+}
+
+/** Of 127.0.0.1, signed by a CA that no browser knows: the files of the certificate and its key. */
+export function makeCertificate(): { cert: string; key: string } {
+  const folder = mkdtempSync(path.join(tmpdir(), "rrgate-tls-"));
+  execFileSync(rrgate, ["cert", "ca", folder]);
+  execFileSync(rrgate, ["cert", "web", folder, "127.0.0.1"]);
+  return { cert: path.join(folder, "127.0.0.1.pem"), key: path.join(folder, "127.0.0.1.key") };
 }
 
 /** The test service as device "big", and a gateway to it; `more`: of its configuration, by the URL of the device. */

@@ -53,6 +53,18 @@ export class Visitor {
       .toMatch(text);
   }
 
+  /** @returns its text once two looks, 300 ms apart, have found the same. */
+  async settled(thing: Thing): Promise<string> {
+    let last: string | null = null;
+    await expect(async () => {
+      const before = last;
+      last = (await this.#look(thing))?.text ?? null;
+      expect(last).not.toBeNull();
+      expect(last).toBe(before);
+    }).toPass({ intervals: [300] });
+    return last!;
+  }
+
   async press(thing: Thing): Promise<void> {
     const letGo = await this.hold(thing);
     await letGo();
@@ -94,16 +106,21 @@ export class Visitor {
 
   /** The lists of browsers open windows that no WebDriver reaches. */
   async choose(thing: Thing, value: string): Promise<void> {
-    await this.see(thing);
-    await this.run(
-      (found: string, value: string) => {
-        const select = document.querySelector<HTMLSelectElement>(found)!;
-        select.value = value;
-        select.dispatchEvent(new Event("change", { bubbles: true }));
-      },
-      "[data-looked-at]",
-      value,
-    );
+    const choose = async (): Promise<boolean> => {
+      await this.see(thing);
+      return this.run(
+        (found: string, value: string) => {
+          const select = document.querySelector<HTMLSelectElement>(found);
+          if (![...(select?.options ?? [])].some((option) => option.value === value)) return false; // not yet
+          select!.value = value;
+          select!.dispatchEvent(new Event("change", { bubbles: true }));
+          return true;
+        },
+        "[data-looked-at]",
+        value,
+      );
+    };
+    await expect.poll(choose, { message: `${value} in ${JSON.stringify(thing)}`, intervals: [100] }).toBe(true);
   }
 
   async resize(width: number, height: number): Promise<void> {

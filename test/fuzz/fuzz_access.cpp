@@ -10,6 +10,7 @@
 #include "server/access/api_tokens.hpp"
 #include "server/access/base64url.hpp"
 #include "server/access/jwt.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -36,6 +37,7 @@ std::string sign(const std::string& claims) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size == 0) return 0;
   static const auto verifier = *JwtVerifier::from_secret(secret, {});
   static const auto tokens = *ApiTokens::from_text("a " + std::string(64, 'a') + " _ _");

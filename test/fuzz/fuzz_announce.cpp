@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/discovery/detected_nodes.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -42,6 +43,7 @@ void check(rr::DetectedNodes& nodes, std::map<rr::NodeId, std::size_t>& told) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   std::string_view rest(reinterpret_cast<const char*>(data), size);
   rr::DetectedNodes nodes(options);
   std::map<rr::NodeId, std::size_t> told;

@@ -8,6 +8,7 @@
 
 #include "test/core/session/loopback.hpp"
 #include "test/fuzz/hostile_peer.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -255,6 +256,7 @@ class HostileDevice {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size > 0 && data[0] == 'R')
     HostileDevice({nullptr, 0}).say({data, size});
   else

@@ -8,6 +8,7 @@
 #include "node/transport/schemes.hpp"
 #include "server/config/cautions.hpp"
 #include "server/config/config.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
 
@@ -108,6 +109,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const auto parsed = parse_config(text, "/etc/rrgate");
   for (const auto& [path, what] : parsed.findings) {

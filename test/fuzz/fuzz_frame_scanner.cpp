@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/wire/frame_scanner.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -51,6 +52,7 @@ Outcome scan(ByteSpan stream, ByteSpan piece_sizes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size == 0) return 0;
   const std::size_t piece_count = std::min<std::size_t>(data[0] % 16, size - 1);
   const ByteSpan piece_sizes(data + 1, piece_count);

@@ -9,6 +9,7 @@
 #include "core/support/error.hpp"
 #include "node/transport/http_connect.hpp"
 #include "node/transport/websocket_frames.hpp"
+#include "test/fuzz/memory_bound.hpp"
 #include "test/fuzz/scripted_stream.hpp"
 
 namespace {
@@ -67,6 +68,7 @@ rr::awaitable<void> run(std::uint8_t kind, std::unique_ptr<rr::ByteStream> strea
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size < 3) return 0;
   static boost::asio::io_context io{1};
   const auto text = rr::as_text(rr::ByteSpan(data, size).subspan(2));

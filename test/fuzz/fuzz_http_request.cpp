@@ -8,6 +8,7 @@
 #include "node/http/foreign_page.hpp"
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
+#include "test/fuzz/memory_bound.hpp"
 #include "test/fuzz/scripted_stream.hpp"
 
 namespace {
@@ -68,6 +69,7 @@ rr::awaitable<void> read_all(rr::ByteStream& stream, bool& is_done) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size < 2) return 0;
   static boost::asio::io_context io{1};
   rr::fuzz::ScriptedStream stream(io, std::string(rr::as_text(rr::ByteSpan(data, size).subspan(1))),

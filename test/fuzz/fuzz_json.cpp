@@ -7,6 +7,7 @@
 #include "core/types/pack.hpp"
 #include "server/json/value_from_json.hpp"
 #include "test/core/types/fixture.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -29,6 +30,7 @@ std::string written(const Value& value, const TypeDefinition& type, const JsonFo
 /// The first byte chooses a type, the second the forms; then comes JSON, or CBOR, whose first bytes may be repeated:
 /// what nests without end is too long for an input.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size < 3) return 0;
   const auto& types = test::test_types();
   static const auto& fields = types.find_entity("test.types.every")->members;

@@ -10,6 +10,7 @@
 #include "server/http/split_path.hpp"
 #include "server/json/arguments.hpp"
 #include "server/socket/json_request.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -160,6 +161,7 @@ void take_frames(rr::ByteSpan bytes, std::size_t piece) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size < 2) return 0;
   const rr::ByteSpan rest(data + 1, size - 1);
   if (data[0] == 't')

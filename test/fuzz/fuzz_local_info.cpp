@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "node/transport/local_files.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -12,6 +13,7 @@ void require(bool claim) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const auto info = rr::parse_local_info(rr::as_text(rr::ByteSpan(data, size)));
   if (!info) {
     require(info.error().message.size() < 500);

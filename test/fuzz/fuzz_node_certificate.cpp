@@ -4,6 +4,7 @@
 #include "core/session/start_tls.hpp"
 #include "node/tls/node_certificate_check.hpp"
 #include "node/tls/openssl.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -30,6 +31,7 @@ void check(const rr::Result<rr::NodeId>& node, X509* certificate) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const openssl::Chain chain(sk_X509_new_null());
   const unsigned char* at = data;
   while (at < data + size && sk_X509_num(chain.get()) < max_certificates) {

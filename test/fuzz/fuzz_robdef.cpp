@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/robdef/robdef.hpp"
+#include "test/fuzz/memory_bound.hpp"
 #include "test/support/is_equal.hpp"
 
 namespace {
@@ -15,6 +16,8 @@ namespace {
 void require(bool claim) {
   if (!claim) std::abort();
 }
+
+constexpr std::size_t most_definitions = 256;  // no service imports more: 10 s for an input would be few
 
 bool has_errors(const std::vector<rr::Diagnostic>& diagnostics) {
   for (const auto& diagnostic : diagnostics) {
@@ -43,7 +46,7 @@ bool check_set(std::string_view text, rr::RobdefMode mode) {
     auto result = rr::parse_service_definition(text.substr(0, end), mode);
     is_good = !has_errors(result.diagnostics) && is_good;
     set.push_back(&definitions.emplace_back(std::move(result.definition)));
-    if (end == std::string_view::npos) break;
+    if (end == std::string_view::npos || definitions.size() == most_definitions) break;
     text.remove_prefix(end + 1);
   }
   // Broken definitions must be harmless, too.
@@ -60,6 +63,7 @@ bool check_set(std::string_view text, rr::RobdefMode mode) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const bool is_strict = check_set(text, rr::RobdefMode::strict);
   const bool is_compat = check_set(text, rr::RobdefMode::compat);

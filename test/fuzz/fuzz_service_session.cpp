@@ -6,6 +6,7 @@
 #include "core/session/service/service_session.hpp"
 #include "test/core/session/loopback.hpp"
 #include "test/fuzz/hostile_peer.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -146,6 +147,7 @@ class HostileClient {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   HostileClient({data, size}).run();
   return 0;
 }

@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "core/session/start_tls.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -14,6 +15,7 @@ void check(bool is_true) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const rr::ByteSpan bytes(data, size);
   const rr::NodeIdentity self{own_id, "fuzz.node"};
   for (const bool can_start_tls : {false, true}) {

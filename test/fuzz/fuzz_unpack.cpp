@@ -8,6 +8,7 @@
 #include "core/wire/codec.hpp"
 #include "test/core/types/fixture.hpp"
 #include "test/core/wire/coded_message.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -39,6 +40,7 @@ void check_value(const Message& message, const MessageElement& element, const Ty
 
 /// A message; or '*' and elements of version 4.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size < 16) return 0;
   Bytes bytes(data, data + size);
   static Message message;

@@ -9,6 +9,7 @@
 #include "core/hardware/usb_link.hpp"
 #include "core/hardware/usb_probe.hpp"
 #include "core/hardware/usb_sub_packet.hpp"
+#include "test/fuzz/memory_bound.hpp"
 
 namespace {
 
@@ -140,6 +141,7 @@ void link(Answers answers) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   if (size == 0) return 0;
   const ByteSpan rest(data + 1, size - 1);
   switch (data[0] % 3) {

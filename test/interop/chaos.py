@@ -6,8 +6,8 @@ back and forth. Clients work all the while, and what must hold is judged:
 
 No packet of a pipe is lost or comes twice within a session, no event either; no call runs twice, and what was answered has run; a
 lock is held by one; who is inside, at a device that no fault is for, is answered within two seconds; when the faults have ended, wires
-have the last value, each value of a wire is accounted for with each of its followers, and the gateway's memory and descriptors are
-what they were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
+have the last value, each value of a wire is accounted for with each client that follows it by Robot Raconteur, and the gateway's memory
+and descriptors are what they were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
 """
 import argparse
 import collections
@@ -356,8 +356,9 @@ class Site:
             self.findings.break_("budget", f"{used} bytes are still in use")
 
     def judge_ledger(self, values=20):
-        """Each value of the wire was delivered to each of its followers, replaced by a newer one, or lost; the ledger knows which."""
-        followers = sum(isinstance(client, Watcher) or client.name in ("native", "websocket") for client in self.clients)
+        """Each value of the wire was delivered to each of its clients by Robot Raconteur, replaced by a newer one, or lost, and the
+        ledger knows which."""
+        followers = sum(client.name in ("native", "websocket") for client in self.clients)
 
         def accounted():
             metrics = self.gateway.metrics()

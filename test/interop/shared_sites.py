@@ -5,7 +5,7 @@ import sys
 import pytest
 import RobotRaconteur as RR
 
-from directions import DIRECTIONS, PEERS, service_command
+from directions import DIRECTIONS, LEVELS, PEERS, service_command
 from processes import Background, start_gateway
 from tap import Tap
 
@@ -27,6 +27,11 @@ def start_arm(folder, *options):
     return device, json.loads(device.next_line())["url"]
 
 
+def start_arm_v2(folder):
+    """Its messages have all names in them."""
+    return start_arm(folder, *LEVELS["v2"])
+
+
 def port_of(url):
     return int(url.split(":")[2].split("/")[0])
 
@@ -40,12 +45,12 @@ def start_service(folder, *options):
 class Site:
     """A device behind a gateway that shares it; there is a line between them that can be cut."""
 
-    def __init__(self, folder, node, device={}, start_device=start_arm, **config):
+    def __init__(self, folder, node, device={}, start_device=start_arm, make_line=Tap, **config):
         self.folder = folder
         self.node = node
         self.start_device = start_device
         self.device, self.url = start_device(folder)
-        self.line = Tap(port_of(self.url))
+        self.line = make_line(port_of(self.url))
         self.roots = []
         url = self.url.replace(f":{port_of(self.url)}/", f":{self.line.port}/")
         try:

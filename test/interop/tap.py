@@ -6,9 +6,11 @@ import threading
 
 
 class Tap:
-    def __init__(self, port, change=bytes):
-        """`change` makes of a piece of what the client sends what the service gets."""
+    def __init__(self, port, change=bytes, make_answers=lambda: bytes):
+        """`change` makes of a piece of what the client sends what the service gets; what `make_answers` makes for each
+        connection does the same the other way."""
         self._change = change
+        self._make_answers = make_answers
         self._target = ("127.0.0.1", port)
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
@@ -42,7 +44,7 @@ class Tap:
                 client.close()
                 continue
             self._sockets += [client, service]
-            for source, sink, change in ((client, service, self._change), (service, client, bytes)):
+            for source, sink, change in ((client, service, self._change), (service, client, self._make_answers())):
                 stream = bytearray()
                 self.streams.append(stream)
                 threading.Thread(target=forward, args=(source, sink, stream, change), daemon=True).start()
@@ -51,6 +53,36 @@ class Tap:
         """"v2", "v4" or "v4+table": what the messages after the handshake are."""
         seen = {message_level(message) for stream in self.streams for message in messages(bytes(stream))}
         return max(seen, default=None)
+
+
+class Held:
+    """A line on which messages of the service with some text in them wait, while `is_on`, until something comes after that."""
+
+    def __init__(self, text):
+        self._text = text
+        self.is_on = False
+        self.messages = []
+
+    def line(self, port):
+        return Tap(port, make_answers=self._make_answers)
+
+    def _make_answers(self):
+        rest = bytearray()
+
+        def change(data):
+            rest.extend(data)
+            passed = b""
+            for message in messages(bytes(rest)):
+                del rest[:len(message)]
+                if self.is_on and self._text in message:
+                    self.messages.append(message)
+                else:
+                    passed += message
+            if not self.is_on:
+                passed = b"".join(self.messages) + passed
+                self.messages.clear()
+            return passed
+        return change
 
 
 def forward(source, sink, stream, change):

@@ -9,6 +9,7 @@ from found_nodes import FIND_DEADLINE, OURS, THEIRS, TYPE, Watch
 from network import Network, run
 from processes import BUILD, Background
 
+REFERENCE_DEADLINE = 20.0  # seconds: it looks at a node that it has heard of when its own time has come
 IDS = [f"1111111{number}-0000-4000-8000-000000000000" for number in range(8)]
 
 
@@ -127,6 +128,32 @@ def test_a_subscription_by_type_follows_nodes_that_come_and_restart(network, sta
         watch.wait_for(subscribed("lost", IDS[1]))
         first = serve(start, implementation, 1, "a.node", IDS[1], port)
         assert watch.wait_for(subscribed("connected", IDS[1]), seconds=10)["one"] == 1
+
+
+def test_a_subscription_by_type_of_the_reference_follows_our_nodes(network, start):
+    watch = Watch(start(0, *THEIRS, "subscribe-type", TYPE))
+    serve(start, "ours", 2, "b.node", IDS[2])
+    watch.wait_for(subscribed("connected", IDS[2]), seconds=REFERENCE_DEADLINE)
+    first = serve(start, "ours", 1, "a.node", IDS[1], 50041)
+    assert watch.wait_for(subscribed("connected", IDS[1]), seconds=REFERENCE_DEADLINE)["one"] == 1
+    first.process.kill()
+    first.process.wait()
+    watch.wait_for(subscribed("lost", IDS[1]))
+    serve(start, "ours", 1, "a.node", IDS[1], 50042)
+    assert watch.wait_for(subscribed("connected", IDS[1]), seconds=REFERENCE_DEADLINE)["one"] == 1
+
+
+def test_the_device_connector_of_the_companion_finds_our_devices_by_their_attributes(network, start):
+    """Each service of ours has its node's name and NodeID as its device, and its own name as a tag."""
+    serve(start, "ours", 2, "b.node", IDS[2])
+    late = Watch(start(0, *THEIRS, "connect-device", TYPE, f"a.node|{IDS[1]}", "thing1"))
+    named = Watch(start(3, *THEIRS, "connect-device", TYPE, "b.node", "thing"))
+    event = named.wait_for(lambda event: event["event"] == "connected", seconds=REFERENCE_DEADLINE)
+    assert (event["id"], event["service"], event["one"]) == (IDS[2], "thing", 1)
+    node = serve(start, "ours", 1, "a.node", IDS[1])
+    node.write_line("another one")
+    event = late.wait_for(lambda event: event["event"] == "connected", seconds=REFERENCE_DEADLINE)
+    assert (event["id"], event["service"], event["one"]) == (IDS[1], "thing1", 1)
 
 
 def test_a_subscription_by_url_outlives_the_service(network, start):

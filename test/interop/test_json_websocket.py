@@ -16,6 +16,8 @@ from http_api import BASE, JSON_PROTOCOL
 import http_api
 from json_sockets import Socket
 from processes import Background, start_gateway
+from shared_sites import Site, start_service
+from tap import Held
 
 ask = functools.partial(http_api.ask, base=BASE)
 
@@ -141,6 +143,38 @@ def test_wires(page):
     page.ask("send", "both", value=21)
     while page.next(subscription=both)["value"] != 42:
         pass
+
+
+def test_an_id_that_is_used_again_names_what_was_opened_last(node, tmp_path):
+    held = Held(b"pose")
+    site = Site(tmp_path, node, start_device=start_service, make_line=held.line)
+    try:
+        with Socket(site.port) as page:
+            page.ask("get", "version")
+            held.is_on = True
+            reused = page.send("subscribe", "pose")
+            wait_until(lambda: held.messages)
+            page.ask("unsubscribe", subscription=reused)
+            page.socket.send(json.dumps({"id": reused, "op": "subscribe", "path": "changed"}))
+            assert page.next(id=reused)["result"] is None
+            held.is_on = False
+            page.ask("call", "fire", args={"count": 1})
+            assert page.next(id=reused)["error"]["message"] == "it was ended before it was open"
+            page.ask("call", "publish_pose", args={"value": {"px": 1, "py": 2, "label": "x"}})
+            page.ask("call", "fire", args={"count": 1})
+            for _ in range(2):
+                assert "number" in page.next(subscription=reused)
+            page.ask("unsubscribe", subscription=reused)
+    finally:
+        site.stop()
+
+
+def test_more_packets_than_wait_at_a_time_arrive_in_order(page):
+    doubled = page.open("subscribe", "doubled")
+    count = 3000
+    for value in range(count):
+        page.socket.send(json.dumps({"op": "send", "path": "doubled", "value": value}))
+    assert [page.next(subscription=doubled)["value"] for _ in range(count)] == [2 * value for value in range(count)]
 
 
 def test_pipes(gateway):

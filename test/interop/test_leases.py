@@ -4,6 +4,7 @@ import contextlib
 import json
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -14,7 +15,8 @@ from json_sockets import Socket
 from leases import LEASES, PLAIN, wait_for
 from news import News
 from processes import free_port
-from shared_sites import Site, is_refused
+from shared_sites import Site, is_refused, start_arm_v2
+from tap import Held
 from users import PASSWORDS, basic, make_users
 
 LOCKED = RR.ObjectLockedException
@@ -163,6 +165,68 @@ def test_a_native_client_that_is_killed_leaves_the_device_safe(site, gateway):
     assert news.all() == [("plain", 1, ""), ("plain", 0, "the connection of its holder has ended")]
     assert not gateway.leases
     assert is_refused(RR.RobotRaconteurException, lambda: gateway.acquire_lease("nobody's", "plain", 1000))
+
+
+def begin_move(arm):
+    threading.Thread(target=arm.move, args=(1.0,), daemon=True).start()
+    wait_for(lambda: arm.moving == 1)
+
+
+def test_a_socket_that_closes_leaves_the_device_safe_whatever_it_still_waits_for(site):
+    arm = site.direct("plain")
+    with Socket(site.port, PLAIN) as page:
+        drives(page, arm)
+        page.ask("lease", deadman=60000)
+        page.send("call", "move", args={"position": 1})
+        wait_for(lambda: arm.moving == 1)
+        page.socket.close()
+        assert wait_for(lambda: is_safe(arm)) < 1
+        assert arm.moving == 1
+    with Socket(site.port, PLAIN) as other:
+        other.ask("set", "target", value=5)  # nobody has the lease
+    arm.finish()
+
+
+def test_a_wire_that_the_device_does_not_connect_holds_up_no_stop_behind_it(node, tmp_path):
+    held = Held(b"target")
+    site = Site(tmp_path, node, {"leases": LEASES}, start_arm_v2, held.line)
+    try:
+        arm = site.direct("plain")
+        with Socket(site.port, PLAIN) as page:
+            page.ask("lease", deadman=20000)
+            begin_move(arm)
+            held.is_on = True
+            for value in (1, 2):
+                page.send("send", "target", value=value)
+            begin = time.monotonic()
+            page.ask("call", "finish")
+            page.ask("renew")
+            assert time.monotonic() - begin < 1
+            assert wait_for(lambda: arm.moving == 0) < 1
+            wait_for(lambda: held.messages)
+            assert arm.seen_target == 0
+            held.is_on = False
+            page.ask("get", "speed")
+            wait_for(lambda: arm.seen_target == 2)
+    finally:
+        site.stop()
+
+
+def test_no_lease_is_given_above_what_another_client_has_locked(node, tmp_path):
+    leases = {"safe": [{"property": "guarded.speed", "value": 0}]}
+    site = Site(tmp_path, node, {"login": {"username": "gateway", "password": "secret"}, "leases": leases})
+    guarded = PLAIN.replace("plain", "guarded")
+    try:
+        with Socket(site.port, guarded) as one, Socket(site.port, guarded) as other:
+            other.ask("lock", "tool")
+            refused = one.refusal("lease", deadman=1000)
+            assert refused == ("ObjectLockedError", "'guarded.tool', which is below, is locked by another client")
+            one.ask("lease", "tools/1", deadman=1000)
+            other.ask("unlock", "tool")
+            one.ask("release", "tools/1")
+            one.ask("lease", deadman=1000)
+    finally:
+        site.stop()
 
 
 def test_requests_of_http_show_the_key_of_their_lease(site):

@@ -319,7 +319,7 @@ def test_no_rate_holds_up_whoever_stops_all_agents(node, tmp_path):
 def test_no_rate_holds_up_an_agent_that_stops_something(node, tmp_path):
     config, agent, _ = with_tokens(tmp_path)
     for of in ("client", "user"):
-        made = Site(tmp_path, node, rates={of: {"per_second": 1}}, **config)
+        made = Site(tmp_path, node, {"leases": LEASES}, rates={of: {"per_second": 1}}, **config)
         try:
             session = {"Mcp-Session-Id": message(made.port, agent, "initialize", 1).headers["Mcp-Session-Id"], **agent}
             devices = {"name": "devices", "arguments": {}}

@@ -1,4 +1,5 @@
 """Recordings that the gateway makes: by its configuration and by HTTP, read by the mcap package; who may, and what goes wrong."""
+import http.client
 import io
 import json
 
@@ -86,7 +87,8 @@ def test_a_device_that_goes_and_comes_is_recorded_on(begin_gateway, tmp_path):
         robot.stop()
         wait_for(lambda: look(gateway, recording), lambda seen: seen["problem"])
         robot, _, _ = make_create(tmp_path, port)
-        wait_for(lambda: look(gateway, recording), lambda now: now["messages"] > seen["messages"] + 50)
+        back = wait_for(lambda: look(gateway, recording), lambda now: now["messages"] > seen["messages"] + 50 and not now["problem"])
+        assert back["state"] == "recording"
         assert len(messages(gateway, stop(gateway, recording))) > seen["messages"] + 50
     finally:
         robot.stop()
@@ -103,6 +105,19 @@ def test_the_configuration_wants_recordings_in_several_files(create, begin_gatew
     gateway.hang_up()
     [ended] = wait_for(lambda: listed(gateway), lambda seen: seen[0]["state"] == "ended")
     assert messages(gateway, ended)
+
+
+def test_a_ring_of_files_goes_on_over_restarts_of_the_gateway(create, begin_gateway):
+    wish = {"device": "create", "service": "Create", "interval_ms": 10, "max_file_bytes": 30_000, "kept_files": 2}
+    gateway = begin_gateway(create, {"record": [wish]})
+    client = begin(gateway, members=["state"])
+    stop(gateway, client)
+    files = lambda: {file["name"] for each in listed(gateway) for file in each["files"] if each["name"] != client["name"]}
+    before = wait_for(files, lambda seen: len(seen) == 2)
+    gateway.process.stop()
+    gateway.start()
+    wait_for(files, lambda seen: not seen & before and len(seen) == 2)
+    assert len(look(gateway, client)["files"]) == 1  # what a client has recorded stays
 
 
 def test_files_are_whole_when_the_gateway_stops_and_readable_when_it_is_killed(create, begin_gateway):
@@ -151,6 +166,17 @@ def test_a_disk_that_is_full_ends_the_recording_alone(create, begin_gateway, tmp
     assert failed["problem"] == gateway.wait_for("recording failed", recording=failed["name"])["error"]
     assert "No space left" in begin(gateway, 507)["detail"]
     assert ask(gateway.port, "GET", "/api/v1/devices/create/Create/DistanceTraveled").status == 200
+
+
+def test_a_download_that_can_not_be_read_to_its_end_breaks_off(create, begin_gateway, tmp_path):
+    need("mount-namespaces")
+    (tmp_path / "recordings").mkdir()
+    file = tmp_path / "recordings" / "old.Dev.20200101T000000000Z.mcap"
+    file.touch()
+    script = 'mount --bind /proc/$$/mem "$1" && shift && exec "$@"'  # a file whose first byte can't be read
+    gateway = begin_gateway(create, command=["unshare", "-m", "--propagation", "private", "sh", "-c", script, "sh", file])
+    with pytest.raises(http.client.IncompleteRead):
+        ask(gateway.port, "GET", f"{API}/{file.name}")
 
 
 def test_who_has_the_right_to_record_alone_may(create, begin_gateway, tmp_path):

@@ -9,8 +9,10 @@ import RobotRaconteur as RR
 
 from gateways import rrgate
 from http_api import ask
-from processes import start_gateway
-from shared_sites import start_service
+from json_sockets import Socket
+from leases import wait_for
+from processes import free_port, start_gateway
+from shared_sites import Site, start_service
 from users import PASSWORDS, RULES, basic, make_users
 
 
@@ -255,3 +257,60 @@ def test_the_audit_log_has_the_first_packet_of_each_wire_and_pipe(node, tmp_path
         assert sorted(recorded()) == [("refused", "vera", "both"), ("write", "root", "both"), ("write", "root", "greetings")]
         for each in (root, vera):
             node.DisconnectService(each)
+
+
+def test_who_loses_the_right_to_lock_gives_back_what_it_has_and_may_say_so(node, tmp_path):
+    """Over a JSON socket and in a native session: locks and leases end at once, and to unlock is not refused."""
+    make_users(tmp_path)
+    guarded = "/api/v1/devices/interop/guarded"
+    everything = ["read", "subscribe", "write", "call"]
+
+    def access(*more):
+        return {"users_file": "users", "rules": [{"roles": ["operator", "viewer"], "may": [*everything, *more]}]}
+
+    port = free_port()
+
+    def is_up():
+        with contextlib.suppress(OSError):
+            return ask(port, "GET", guarded + "/speed", headers=basic("vera")).status == 200
+
+    device = {"login": {"username": "gateway", "password": "secret"}, "leases": {"safe": [{"property": "guarded.speed", "value": 0}]}}
+    site = Site(tmp_path, node, device, access=access("lock"), port=port, is_up=is_up)
+    native = None
+    try:
+        native = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", *password_of("alice"))
+        with Socket(port, guarded, additional_headers=basic("alice")) as page, \
+                Socket(port, guarded, additional_headers=basic("vera")) as other:
+            page.ask("lock", "tool")
+            page.ask("lease", "tools/0", deadman=60000)
+            tool = native.get_tools(1)
+            node.RequestObjectLock(tool, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK)
+            places = ["tool/opening", "tools/0/opening", "tools/1/opening"]
+            for place in places:
+                assert other.refusal("set", place, value=1)[0] == "ObjectLockedError", place
+            config = json.loads((tmp_path / "gateway.json").read_text())
+            (tmp_path / "gateway.json").write_text(json.dumps({**config, "access": access()}))
+            wait_for(lambda: "configuration read anew" in (tmp_path / "gateway.log").read_text())
+            assert page.next(lease="guarded.tools[0]")["reason"] == "its holder has no right to it any more"
+
+            def passes(place):
+                return "error" not in other.next(id=other.send("set", place, value=1))
+            for place in places:
+                wait_for(lambda: passes(place))
+            for place in places[:2]:
+                name, message = page.refusal("set", place, value=2)
+                assert name == "ObjectLockedError" and "unlock it" in message or "release it" in message, message
+            page.ask("unlock", "tool")
+            page.ask("release", "tools/0")
+            node.ReleaseObjectLock(tool)
+            for place in places[:2]:
+                page.ask("set", place, value=2)
+            tool.opening = 3.0
+            assert page.refusal("lock", "tool")[0] == "PermissionDenied"
+            assert page.refusal("unlock", "tool")[0] == "PermissionDenied"
+            with pytest.raises(RR.PermissionDeniedException):
+                node.RequestObjectLock(tool, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK)
+    finally:
+        if native is not None:
+            node.DisconnectService(native)
+        site.stop()

@@ -22,6 +22,15 @@ TEST_CASE("agents: a session keeps its newest commands and counts them all") {
   CHECK(all.list().front()->has_ended);
 }
 
+TEST_CASE("agents: a session that is used again after its end has not ended") {
+  AgentSessions all;
+  const auto session = all.visit("a", "vera", "10.0.0.5");
+  all.end("a");
+  REQUIRE(session->has_ended);
+  CHECK(all.visit("a", "vera", "10.0.0.5") == session);
+  CHECK_FALSE(session->has_ended);
+}
+
 TEST_CASE("agents: strangers without end push out nobody who has commanded something") {
   AgentSessions all;
   const auto first = all.visit("first", "vera", "10.0.0.5");

@@ -135,6 +135,19 @@ TEST_CASE("a response that there is no memory for becomes 503; one that others h
   CHECK(exchange.client.received.size() > 300'000);
 }
 
+TEST_CASE("a response whose rest can't be had breaks off, and does not look like a whole one") {
+  Exchange exchange;
+  exchange.run([&]() -> rr::awaitable<void> {
+    Response head;
+    co_await exchange.writer.begin(head);
+    co_await exchange.writer.write("half");
+    exchange.writer.break_off();
+  });
+  CHECK(exchange.client.is_closed);
+  CHECK_FALSE(exchange.writer.goes_on());
+  CHECK_THAT(exchange.client.received, Catch::EndsWith("4\r\nhalf\r\n"));
+}
+
 TEST_CASE("a client that leaves is noticed at once, whatever it has sent and does not take") {
   Exchange exchange;
   bool is_gone = false;

@@ -295,15 +295,19 @@ class HttpDoor final : public Door {
   /// Whether the answer is no refusal.
   bool ask(const std::string& method, const std::string& target, const std::string& body = {},
            const std::string& lines = {}) const {
+    return answer(method, target, body, lines).status / 100 == 2;
+  }
+  TestClient::HttpResponse answer(const std::string& method, const std::string& target, const std::string& body = {},
+                                  const std::string& lines = {}, bool has_body = false) const {
     TestClient client(port_);
     const auto length = "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
     client.send(method + " " + target + " HTTP/1.1\r\nHost: localhost\r\n" + login_.header() + lines +
                 (body.empty() ? "" : length) + "\r\n" + body);
-    const auto response = client.receive_response(false);
+    auto response = client.receive_response(has_body);
     INFO(method << " " << target << ": " << response.head);
     const bool is_refused = response.status == 401 || response.status == 403;
     REQUIRE((is_refused || response.status / 100 == 2));
-    return !is_refused;
+    return response;
   }
 
  private:
@@ -459,6 +463,8 @@ class RandomRules {
       }
       out.push_back(std::move(rule));
     }
+    for (const auto verb : {Verb::metrics, Verb::admin})
+      out.push_back({.roles = some({"viewer", "operator", "guest"}, 3), .may = {verb}});
     return out;
   }
 
@@ -514,6 +520,24 @@ rr::RemoteObject connect_as(const Login& login, const std::string& url) {
   return login.user.empty() ? rr::connect(url) : rr::connect(url, login.user, "secret");
 }
 
+/// What the gateway tells somebody about his rights, against the rules.
+void check_told_rights(const HttpDoor& http, const AccessRules& rules, const Identity& who) {
+  const auto told = nlohmann::json::parse(http.answer("GET", "/api/v1/access", {}, {}, true).body);
+  auto may = nlohmann::json::array();
+  for (const auto verb : {Verb::metrics, Verb::admin})
+    if (rules.check(who, {.verb = verb})) may.push_back(to_string(verb));
+  CHECK(told["may"] == may);
+  for (const std::string device : {"robot", "raw"}) {
+    INFO(device << ": " << told.dump());
+    CHECK(told["devices"].contains(device) == rules.sees(who, device));
+    if (!told["devices"].contains(device)) continue;
+    for (const auto verb : device_verbs) {
+      const auto extent = told["devices"][device].value(std::string(to_string(verb)), "none");
+      CHECK(extent == to_string(rules.extent(who, device, verb)));
+    }
+  }
+}
+
 }  // namespace
 
 TEST_CASE("rights are the same by every face: what one grants all grant, what one refuses all refuse") {
@@ -542,6 +566,13 @@ TEST_CASE("rights are the same by every face: what one grants all grant, what on
       TestClient socket(port);
       CHECK((JsonDoor::open(socket, login, service) == 101) == sees);
     }
+    // The gateway itself.
+    check_told_rights(http, rules, who);
+    const bool is_admin = rules.check(who, {.verb = Verb::admin}).has_value();
+    for (const auto* target : {"/api/v1/audit", "/api/v1/audit?user=root", "/api/v1/access/requests",
+                               "/api/v1/agents/approvals", "/api/v1/agents/sessions"})
+      CHECK(http.ask("GET", target) == is_admin);
+    CHECK(http.ask("GET", "/metrics") == rules.check(who, {.verb = Verb::metrics}).has_value());
     // A device whose bytes pass unread.
     TestClient relayed(port);
     const auto status = relayed.upgrade("/devices/raw", login.header()).status;

@@ -2,7 +2,7 @@
 import { packBoard, parseBoard, recallBoard, sameBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
 import type { Board } from "../../web/src/board/board";
 import { Keeper } from "../../web/src/board/keeper";
-import { findRoom, nudge, put, settle } from "../../web/src/board/layout";
+import { findRoom, nudge, put, settle, spread } from "../../web/src/board/layout";
 import type { Placed } from "../../web/src/board/layout";
 import { hasPreset, presetFor, stopFor } from "../../web/src/board/presets";
 import { Pace } from "../../web/src/live/pace";
@@ -284,6 +284,33 @@ describe("the layout", () => {
     expect(findRoom(panels, { w: 4, h: 4 })).toEqual({ x: 0, y: 7, w: 4, h: 4 });
     expect(findRoom([], { w: 40, h: 4 })).toEqual({ x: 0, y: 0, w: 12, h: 4 });
   });
+
+  test("spreads over a wider screen, in order, and is as it was on a desk", () => {
+    const wide = spread(panels, 12, 24);
+    expect(wide.map(({ x, y, w }) => [x, y, w])).toEqual([
+      [0, 0, 6],
+      [6, 0, 6],
+      [12, 0, 12],
+    ]);
+    expect(spread(panels, 12, 18).map(({ x, y }) => [x, y])).toEqual([
+      [0, 0],
+      [6, 0],
+      [0, 4],
+    ]);
+    expect(spread(panels, 12, 12)).toEqual(panels);
+  });
+
+  test("that was arranged on a wide screen stays there, and finds room on a desk", () => {
+    const arranged = put(spread(panels, 12, 24), "a", { x: 20, w: 4 }, 24);
+    expect(overlaps(arranged)).toBe(0);
+    expect(arranged.find(({ id }) => id === "a")).toMatchObject({ x: 20, w: 4, y: 0 });
+    expect(spread(arranged, 24, 24)).toEqual(arranged);
+    const folded = spread(arranged, 24, 12);
+    expect(overlaps(folded)).toBe(0);
+    expect(folded.every(({ x, w }) => x + w <= 12)).toBe(true);
+    expect(folded.map(({ id }) => id)).toEqual(["a", "b", "c"]);
+    expect(spread([{ id: "a", x: 0, y: 0, w: 24, h: 4 }], 24, 12)).toEqual([{ id: "a", x: 0, y: 0, w: 12, h: 4 }]);
+  });
 });
 
 describe("a board", () => {
@@ -296,6 +323,9 @@ describe("a board", () => {
     const packed = packBoard(board);
     expect(packed).toMatch(/^[\w-]+$/);
     expect(writeBoard(unpackBoard(packed))).toEqual(writeBoard(board));
+    const wide = '{"board":1,"columns":24,"panels":[{"kind":"notes","x":20,"y":0,"w":4,"h":5}]}';
+    expect(JSON.stringify(writeBoard(parseBoard(wide)))).toContain('"columns":24');
+    expect(unpackBoard(packBoard(parseBoard(wide))).panels[0]).toMatchObject({ x: 20, w: 4 });
     expect(() => unpackBoard("%%%")).toThrow("the board in it is cut off or changed");
   });
 
@@ -316,6 +346,7 @@ describe("a board", () => {
         '/panels/0/from is "arm", expected "device/service"',
       ],
       ['{"board":1,"panels":[],"stop":{"call":1}}', "/stop/call is 1, expected the name of a function"],
+      ['{"board":1,"columns":11,"panels":[]}', 'field "columns" is 11, expected a whole number from 12 to 24'],
       ["{", "the file is no JSON"],
     ] as const)
       expect(() => parseBoard(file), file).toThrow(words);
@@ -324,6 +355,29 @@ describe("a board", () => {
   test("that this browser keeps and cannot read any more is no board", () => {
     expect(recallBoard("x", { getItem: () => "{}" })).toBeNull();
     expect(recallBoard("x", { getItem: () => JSON.stringify(writeBoard(board)) })?.stop?.call).toBe("halt");
+  });
+
+  test("begins without panels of devices that the gateway does not have", () => {
+    const drive: Member = {
+      name: "Drive",
+      kind: "function",
+      type: "void",
+      parameters: [],
+      modifiers: [],
+      documentation: "",
+    };
+    const robot = {
+      type: "experimental.simulatedcreate.SimulatedCreate",
+      members: [drive, { ...drive, name: "FrameStream", kind: "pipe" as const, type: "WebcamImage" }],
+      definitions: new Definitions([]),
+      scope: "experimental.simulatedcreate",
+    };
+    const kinds = (devices?: string[]) => presetFor({ ...robot, devices }).panels.map(({ kind }) => kind);
+    expect(kinds()).toContain("image");
+    expect(kinds(["create", "webcams"])).toContain("image");
+    expect(kinds(["robot-1", "robot-2"])).not.toContain("image");
+    const cameras = { ...robot, type: "experimental.createwebcam2.WebcamHost", devices: ["eyes"] };
+    expect(presetFor(cameras).panels.map(({ kind }) => kind)).toEqual(["image", "image"]); // of the service itself
   });
 
   test("starts from the type where it is known, else from the members", () => {

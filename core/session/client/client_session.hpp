@@ -176,6 +176,8 @@ class ClientSession {
   RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
+  /// Drops a value that send_wire() keeps because much waits for the stream.
+  void drop_waiting_value(std::string_view path, std::string_view member);
   bool has_wire(std::string_view path, std::string_view member) const {
     return wires_.contains(PathMemberView{path, member});
   }

@@ -54,6 +54,11 @@ Result<> ClientSession::send_wire(std::string_view path, std::string_view member
   return send_wire_packet(found->first, found->second, value, now);
 }
 
+void ClientSession::drop_waiting_value(std::string_view path, std::string_view member) {
+  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end())
+    found->second.waiting.reset();
+}
+
 Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now) {
   wire.waiting.reset();
   connection_.begin_message(outgoing_);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/session/url.hpp"
 #include "node/http/foreign_page.hpp"
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
@@ -149,6 +150,23 @@ rr::awaitable<void> answer_sign_in(GatewayState& gateway, ResponseWriter& writer
   co_await writer.send(*response);
 }
 
+/// Of the devices that somebody sees, by their names: of how much of each he may do what.
+Json rights_to_devices(GatewayState& gateway, const Identity& who) {
+  auto out = Json::object();
+  const auto& access = gateway.access();
+  for (const auto& device : gateway.devices().all()) {
+    const auto& name = device->config().name;
+    if (!access.sees(who, name)) continue;
+    auto& rights = rr::add_key(out, name) = Json::object();
+    for (const auto verb : all_verbs) {
+      if (!is_device_verb(verb)) continue;
+      const auto extent = access.state().rules.extent(who, name, verb);
+      if (extent != Extent::none) rr::add_key(rights, to_string(verb)) = std::string(to_string(extent));
+    }
+  }
+  return out;
+}
+
 /// Pages of allowed origins show who they are themselves.
 std::optional<Response> refuse_other_page(const Request& request) {
   if (request.message.count(http::field::origin) == 0 || is_from_own_page(request)) return std::nullopt;
@@ -183,6 +201,9 @@ Handler who_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     const auto& who = request.identity;
     const auto& access = gateway.access();
+    const auto devices = rr::query_value(request.query(), "devices").value_or("true");
+    if (devices != "true" && devices != "false")
+      return error_answer(bad_request("devices is " + rr::quote(devices) + ", expected true or false"));
     Json out;
     out["user"] = nullptr;
     if (who.is_proven()) out["user"] = who.name;
@@ -192,7 +213,17 @@ Handler who_endpoint(GatewayState& gateway) {
     out["requests"] = !access.state().config.tokens_file.empty();
     out["session"] = !who.sign_in.empty();
     out["admin"] = !access.is_open() && access.state().rules.check(who, {.verb = Verb::admin}).has_value();
-    return json_answer(200, out);
+    out["expires_in"] = nullptr;
+    if (who.ends != Identity::never)
+      out["expires_in"] =
+          std::max<std::int64_t>(0, std::chrono::floor<std::chrono::seconds>(who.ends - Clock::now()).count());
+    auto& may = out["may"] = Json::array();
+    for (const auto verb : {Verb::metrics, Verb::admin})
+      if (access.state().rules.check(who, {.verb = verb})) may.push_back(std::string(to_string(verb)));
+    if (devices == "true") out["devices"] = rights_to_devices(gateway, who);
+    auto response = json_answer(200, out);
+    response.set("Cache-Control", "no-store");
+    return response;
   };
 }
 

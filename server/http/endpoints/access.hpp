@@ -11,8 +11,10 @@ namespace rrgate {
 class GatewayState;
 
 /// GET /api/v1/access: {"user","roles","proof","login": whether there is anything to prove,"requests": whether one may
-/// ask for access,"admin": whether one decides on that,"session": whether a cookie has said so}; user is null for who
-/// has shown nothing.
+/// ask for access,"admin": whether one decides on that,"session": whether a cookie has said so,"expires_in": seconds
+/// until what was shown is good no more,"may": what may be done to the gateway,"devices": {NAME: {VERB: "all" or
+/// "some"}}}; user is null for who has shown nothing, expires_in for what is good for ever. ?devices=false leaves those
+/// out.
 Handler who_endpoint(GatewayState& gateway);
 /// POST /api/v1/session {"user","password"}, {"token"}, or with Authorization: 201 {"user","roles","expires_in"} and a
 /// cookie that says the same from then on (SignIns).

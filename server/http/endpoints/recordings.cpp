@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
+#include <optional>
 
 #include "core/session/service/service_index.hpp"
 #include "server/access/standing.hpp"
@@ -111,63 +113,133 @@ std::string only_service(const Device& device) {
   return out;
 }
 
-Response begin_recording(GatewayState& gateway, const Request& request) {
+using Answer = rr::awaitable<Response>;
+
+rr::awaitable<void> send_made(std::function<Answer(const Request&)> make, ResponseWriter& writer) {
+  const auto response = co_await make(writer.request());
+  co_await writer.send(response);
+}
+
+/// A response that others do not wait for while it is made.
+Response make_later(std::function<Answer(const Request&)> make) {
+  Response out;
+  out.answer_later = [make = std::move(make)](ResponseWriter& writer) { return send_made(make, writer); };
+  return out;
+}
+
+Answer begin_recording(GatewayState& gateway, const Request& request) {
   const auto body = body_of(request);
-  if (!body) return error_answer(body.error());
+  if (!body) co_return error_answer(body.error());
   auto wish = read_wish(*body);
-  if (!wish) return error_answer(wish.error());
+  if (!wish) co_return error_answer(wish.error());
   const auto* device = gateway.devices().find(wish->device);
   if (device && wish->service.empty()) wish->service = only_service(*device);
   const AccessRequest wanted{.device = wish->device, .service = wish->service, .verb = Verb::record};
   const auto entry = gateway.access().check_and_begin(request.identity, wanted, {}, "recording_begun");
-  if (!entry) return refuse_recorder(gateway, request, entry.error());
-  rr::Result<std::string> begun = device && wish->service.empty()
-                                      ? bad_request("service is missing, and the device has none, or several")
-                                      : gateway.recordings().begin(*wish);
+  if (!entry) co_return refuse_recorder(gateway, request, entry.error());
+  rr::Result<std::string> begun = bad_request("service is missing, and the device has none, or several");
+  if (!device || !wish->service.empty()) begun = co_await gateway.recordings().begin(*wish);
   if (*entry)
     (*entry)->finish(begun ? Outcome::ok : Outcome::error, begun ? std::string_view(*begun) : begun.error().message);
-  if (!begun) return failure_answer(begun.error());
-  auto response = json_answer(201, described(*gateway.recordings().find(*begun)));
+  if (!begun) co_return failure_answer(begun.error());
+  const auto recording = co_await gateway.recordings().find(*begun);
+  if (!recording) co_return failure_answer(rr::make_error(rr::ErrorCode::resource_not_found, "it was deleted already"));
+  auto response = json_answer(201, described(*recording));
   response.set("Location", request.arrival.prefix + "/api/v1/recordings/" + *begun);
-  return response;
+  co_return response;
 }
 
-/// A recording that the asker may have. Else   what to answer.
-struct Found {
-  std::optional<RecordingInfo> recording;
-  AuditEntryPtr entry;
-  Response refusal;
-};
-
-/// `event`  of the record; empty: none is made.
-Found find_recording(GatewayState& gateway, const Request& request, std::string_view name, std::string_view event) {
-  Found out;
-  // Who may not record the device is not told whether there is a recording.
-  const auto said = parse_recording_name(name);
-  const auto wanted = said ? wanted_of(*said) : AccessRequest{.verb = Verb::record};
-  if (const auto allowed = gateway.access().check(request.identity, wanted); !allowed) {
-    out.refusal = refuse_recorder(gateway, request, allowed.error());
-    return out;
-  }
-  out.recording = gateway.recordings().find(name);
-  if (!out.recording)
-    out.refusal = problem_response(404, "no recording " + rr::quote(name) + "; /api/v1/recordings lists them");
-  else if (!event.empty())
-    out.entry = gateway.access().begin(request.identity, wanted, {}, event);
-  return out;
+Response refuse_finder(GatewayState& gateway, const Request& request, const rr::Error& why) {
+  if (why.code != rr::ErrorCode::resource_not_found) return refuse_recorder(gateway, request, why);
+  return problem_response(404, why.message + "; /api/v1/recordings lists them");
 }
 
-Response answer_recorded(const Found& found, const rr::Result<>& done, Response response) {
-  if (found.entry)
-    found.entry->finish(done ? Outcome::ok : Outcome::error,
-                        done ? std::string_view(found.recording->name) : done.error().message);
+/// What is done with a recording goes into the record. `event`  a literal.
+AuditEntryPtr begin_entry(GatewayState& gateway, const Request& request, const RecordingInfo& recording,
+                          std::string_view event) {
+  return gateway.access().begin(request.identity, wanted_of(recording), {}, event);
+}
+
+Response answer_recorded(const AuditEntryPtr& entry, std::string_view name, const rr::Result<>& done,
+                         Response response) {
+  if (entry) entry->finish(done ? Outcome::ok : Outcome::error, done ? name : done.error().message);
   return done ? std::move(response) : failure_answer(done.error());
 }
 
-rr::awaitable<void> send_file(ResponseWriter& writer, std::string path, std::string name) {
-  constexpr std::size_t part_bytes = 64u * 1024;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
+Answer look_at_recording(GatewayState& gateway, const Request& request, std::string name) {
+  const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
+  if (!found) co_return refuse_finder(gateway, request, found.error());
+  auto response = json_answer(200, described(*found));
+  response.set("Cache-Control", "no-store");
+  co_return response;
+}
+
+Answer stop_recording(GatewayState& gateway, const Request& request, std::string name) {
+  const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
+  if (!found) co_return refuse_finder(gateway, request, found.error());
+  const auto entry = begin_entry(gateway, request, *found, "recording_stopped");
+  const auto done = gateway.recordings().end(name);
+  const auto now = co_await gateway.recordings().find(name);
+  co_return answer_recorded(entry, name, done, json_answer(200, described(now.value_or(*found))));
+}
+
+Answer delete_recording(GatewayState& gateway, const Request& request, std::string name) {
+  const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
+  if (!found) co_return refuse_finder(gateway, request, found.error());
+  const auto entry = begin_entry(gateway, request, *found, "recording_deleted");
+  const auto done = co_await gateway.recordings().remove(name);
+  Response response;
+  response.status = 204;
+  co_return answer_recorded(entry, name, done, std::move(response));
+}
+
+Answer list_recordings(GatewayState& gateway, const Request& request) {
+  const auto& limits = gateway.config().recordings;
+  Json out;
+  out["enabled"] = !limits.folder.empty();
+  std::uint64_t bytes = 0;
+  auto list = Json::array();
+  const auto recordings = co_await gateway.recordings().list(gateway.access().state_ptr(), request.identity);
+  for (const auto& each : recordings) {
+    bytes += each.bytes();
+    list.push_back(described(each));
+  }
+  out["bytes"] = bytes;
+  out["max_bytes"] = limits.max_bytes;
+  out["recordings"] = std::move(list);
+  auto response = json_answer(200, out);
+  response.set("Cache-Control", "no-store");
+  co_return response;
+}
+
+// --- files ---
+
+/// Read on the workers: whoever waits for a disk keeps nobody else waiting.
+class Download {
+ public:
+  explicit Download(std::string path) : path_(std::move(path)) {}
+
+  bool open() {
+    file_.open(path_, std::ios::binary);
+    return file_.is_open();
+  }
+  /// nullopt: it can't be read. Empty: that was all.
+  std::optional<std::string_view> read() {
+    file_.read(part_.data(), static_cast<std::streamsize>(part_.size()));
+    if (file_.bad()) return std::nullopt;
+    return std::string_view(part_.data(), static_cast<std::size_t>(file_.gcount()));
+  }
+
+ private:
+  std::string path_;
+  std::ifstream file_;
+  std::string part_ = std::string(256u * 1024, '\0');
+};
+
+rr::awaitable<void> send_file(GatewayState& gateway, ResponseWriter& writer, std::string path, std::string name) {
+  Download download(std::move(path));
+  const auto open = [&download] { return download.open(); };
+  if (!co_await gateway.workers().run(open)) {
     const auto response = problem_response(404, "the file has gone");
     co_await writer.send(response);
     co_return;
@@ -176,96 +248,92 @@ rr::awaitable<void> send_file(ResponseWriter& writer, std::string path, std::str
   head.set("Content-Type", "application/octet-stream").set("Cache-Control", "no-store");
   head.set("Content-Disposition", "attachment; filename=\"" + name + "\"");
   if (co_await writer.begin(head) || !writer.has_body()) co_return;
-  std::string part(part_bytes, '\0');
+  const auto read = [&download] { return download.read(); };
   for (;;) {
-    file.read(part.data(), static_cast<std::streamsize>(part.size()));
-    const std::string_view got(part.data(), static_cast<std::size_t>(file.gcount()));
-    if (got.empty()) break;
-    const auto failed = co_await writer.write(got);
+    const auto part = co_await gateway.workers().run(read);
+    if (!part) co_return writer.break_off();
+    if (part->empty()) break;
+    const auto failed = co_await writer.write(*part);
     if (failed) co_return;
   }
   co_await writer.end();
 }
 
-Response download(GatewayState& gateway, const Request& request, std::string_view file, const std::string& name) {
-  auto found = find_recording(gateway, request, name, "recording_downloaded");
-  if (!found.recording) return std::move(found.refusal);
-  const auto& files = found.recording->files;
-  const auto it = std::find_if(files.begin(), files.end(), [&](const auto& each) { return each.name == file; });
-  if (it == files.end()) return problem_response(404, "the recording has no file " + rr::quote(file));
-  Response response;
+rr::awaitable<void> send_download(GatewayState& gateway, ResponseWriter& writer, std::string name, std::string file) {
+  const auto& request = writer.request();
+  auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
+  Response refusal;
+  const RecordingFile* wanted = nullptr;
+  if (found) {
+    const auto& files = found->files;
+    const auto it = std::find_if(files.begin(), files.end(), [&](const auto& each) { return each.name == file; });
+    if (it != files.end()) wanted = &*it;
+  }
+  if (!found)
+    refusal = refuse_finder(gateway, request, found.error());
+  else if (!wanted)
+    refusal = problem_response(404, "the recording has no file " + rr::quote(file));
+  if (!wanted) {
+    co_await writer.send(refusal);
+    co_return;
+  }
+  if (const auto entry = begin_entry(gateway, request, *found, "recording_downloaded"))
+    entry->finish(Outcome::ok, found->name);
   const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
-  const auto recording = std::make_shared<const RecordingInfo>(*found.recording);
-  response.answer_later = [path = gateway.recordings().path_of(*it), name = it->name, standing,
-                           recording](ResponseWriter& writer) {
-    writer.go_on_while(
-        [standing, recording] { return standing->check(wanted_of(*recording), Recorded::never).has_value(); });
-    return send_file(writer, path, name);
-  };
-  return answer_recorded(found, {}, std::move(response));
+  auto path = gateway.recordings().path_of(*wanted);
+  const auto recording = std::make_shared<const RecordingInfo>(std::move(*found));
+  writer.go_on_while(
+      [standing, recording] { return standing->check(wanted_of(*recording), Recorded::never).has_value(); });
+  co_await send_file(gateway, writer, std::move(path), std::move(file));
 }
 
 }  // namespace
 
 Handler recordings_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
-    const auto& limits = gateway.config().recordings;
-    const auto& rules = gateway.access().state().rules;
-    if (!rules.sees_any(request.identity))
+    if (!gateway.access().state().rules.sees_any(request.identity))
       return gateway.http_access().refusal(
           request, rr::make_error(rr::ErrorCode::permission_denied, "you may use nothing here"));
-    Json out;
-    out["enabled"] = !limits.folder.empty();
-    std::uint64_t bytes = 0;
-    auto list = Json::array();
-    for (const auto& each : gateway.recordings().list()) {
-      if (!rules.check(request.identity, wanted_of(each))) continue;
-      bytes += each.bytes();
-      list.push_back(described(each));
-    }
-    out["bytes"] = bytes;
-    out["max_bytes"] = limits.max_bytes;
-    out["recordings"] = std::move(list);
-    auto response = json_answer(200, out);
-    response.set("Cache-Control", "no-store");
-    return response;
+    return make_later([&gateway](const Request& asked) { return list_recordings(gateway, asked); });
   };
 }
 
 Handler begin_recording_endpoint(GatewayState& gateway) {
-  return [&gateway](const Request& request, std::string_view) { return begin_recording(gateway, request); };
+  return [&gateway](const Request&, std::string_view) {
+    return make_later([&gateway](const Request& request) { return begin_recording(gateway, request); });
+  };
 }
 
 Handler recording_endpoint(GatewayState& gateway) {
-  return [&gateway](const Request& request, std::string_view rest) {
-    if (const auto name = recording_of_file(rest); !name.empty()) return download(gateway, request, rest, name);
-    auto found = find_recording(gateway, request, rest, {});
-    if (!found.recording) return std::move(found.refusal);
-    auto response = json_answer(200, described(*found.recording));
-    response.set("Cache-Control", "no-store");
+  return [&gateway](const Request&, std::string_view rest) {
+    const auto name = recording_of_file(rest);
+    if (name.empty())
+      return make_later([&gateway, rest = std::string(rest)](const Request& request) {
+        return look_at_recording(gateway, request, rest);
+      });
+    Response response;
+    response.answer_later = [&gateway, name, file = std::string(rest)](ResponseWriter& writer) {
+      return send_download(gateway, writer, name, file);
+    };
     return response;
   };
 }
 
 Handler stop_recording_endpoint(GatewayState& gateway) {
-  return [&gateway](const Request& request, std::string_view rest) {
+  return [&gateway](const Request&, std::string_view rest) {
     if (!rest.ends_with(stop_suffix)) return problem_response(404, "expected /api/v1/recordings/NAME/stop");
     rest.remove_suffix(stop_suffix.size());
-    auto found = find_recording(gateway, request, rest, "recording_stopped");
-    if (!found.recording) return std::move(found.refusal);
-    const auto done = gateway.recordings().end(rest);
-    const auto now = gateway.recordings().find(rest);
-    return answer_recorded(found, done, json_answer(200, described(now.value_or(*found.recording))));
+    return make_later([&gateway, name = std::string(rest)](const Request& request) {
+      return stop_recording(gateway, request, name);
+    });
   };
 }
 
 Handler delete_recording_endpoint(GatewayState& gateway) {
-  return [&gateway](const Request& request, std::string_view rest) {
-    auto found = find_recording(gateway, request, rest, "recording_deleted");
-    if (!found.recording) return std::move(found.refusal);
-    Response response;
-    response.status = 204;
-    return answer_recorded(found, gateway.recordings().remove(rest), std::move(response));
+  return [&gateway](const Request&, std::string_view rest) {
+    return make_later([&gateway, name = std::string(rest)](const Request& request) {
+      return delete_recording(gateway, request, name);
+    });
   };
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "server/limits/memory_budget.hpp"
-#include "server/state/workers.hpp"
+#include "server/limits/workers.hpp"
 #include "server/upstream/value_client.hpp"
 
 namespace rrgate {

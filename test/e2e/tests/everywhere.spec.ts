@@ -209,3 +209,60 @@ test("can be installed, and says plainly that it is offline", async ({ page, lab
   await page.getByRole("link", { name: /Try again/ }).click();
   await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
 });
+
+test("a wall screen is used to its edge; what is arranged there is found again, and finds room on a desk", async ({
+  page,
+  lab,
+}) => {
+  await page.setViewportSize({ width: 3840, height: 2160 });
+  await page.goto(`${lab.url}#/devices/create/Create?view=board`);
+  const panels = page.locator(".board-panel");
+  await expect(panels.first()).toBeVisible();
+  const shape = () =>
+    page.locator(".board").evaluate((board) => {
+      const places = [...board.querySelectorAll(".board-panel")].map((panel) => panel.getBoundingClientRect());
+      const overlap = places.some((a, at) =>
+        places.some(
+          (b, other) => other < at && a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom,
+        ),
+      );
+      return {
+        width: board.clientWidth,
+        columns: getComputedStyle(board).gridTemplateColumns.split(" ").length,
+        right: Math.max(...places.map(({ right }) => right)),
+        overlap,
+      };
+    });
+  const wall = await shape();
+  expect(wall).toMatchObject({ columns: 24, overlap: false });
+  expect(wall.width).toBeGreaterThan(3700);
+  expect(wall.right).toBeGreaterThan(2600);
+  const count = await panels.count();
+
+  await page.getByRole("button", { name: "Arrange" }).click();
+  const handle = panels.first().getByRole("button", { name: /^Move or size/ });
+  await handle.focus();
+  for (let step = 0; step < 30; step++) await page.keyboard.press("ArrowRight");
+  await page.getByRole("button", { name: "Done" }).click();
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  const arranged = await shape();
+  expect(arranged.overlap).toBe(false);
+  expect(arranged.right).toBeGreaterThan(3700);
+  await page.reload();
+  await expect(panels).toHaveCount(count);
+  expect(await shape()).toEqual(arranged);
+
+  const tooWide = () =>
+    page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  for (const [width, columns] of [
+    [2560, 18],
+    [1280, 12],
+  ] as const) {
+    await page.setViewportSize({ width, height: 1200 });
+    await expect.poll(shape).toMatchObject({ columns, overlap: false });
+    await expect(panels).toHaveCount(count);
+    expect(await tooWide()).toBeLessThanOrEqual(0);
+  }
+  await page.setViewportSize({ width: 3840, height: 2160 });
+  await expect.poll(shape).toEqual(arranged); // nothing was written meanwhile
+});

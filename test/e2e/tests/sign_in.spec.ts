@@ -47,7 +47,7 @@ test("a wrong password is told; the right one shows the devices, in all tabs unt
   await expect(form(page)).toBeVisible();
   await expect(page.getByLabel("Name")).toBeFocused();
   await page.getByLabel("Name").fill("vera");
-  await page.waitForResponse(/\/api\/v1\/access$/); // the page looks again: what is typed stays
+  await page.waitForResponse(/\/api\/v1\/access\?/); // the page looks again: what is typed stays
   await expect(page.getByLabel("Name")).toBeFocused();
   await expect(page.getByLabel("Name")).toHaveValue("vera");
   await signIn(page, "root", "wrong");

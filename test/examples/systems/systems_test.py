@@ -11,7 +11,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from serial_robot import DEADLINE, Robot, wait_for
+from serial_scenarios import DEADLINE, Program, SerialScenarios, wait_for
 
 BUILD = sys.argv.pop(1)
 RRGATE = os.path.join(BUILD, "server", "rrgate")
@@ -34,27 +34,6 @@ def get(*arguments):
 
 def colour(value):
     return [value[name] for name in ("red", "green", "blue")]
-
-
-class Program:
-    """One that says its URL in its first line with "://"."""
-
-    def __init__(self, test, *command):
-        self.log = test.enterContext(tempfile.TemporaryFile("w+"))
-        self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=self.log, text=True)
-        test.addCleanup(self.process.stdout.close)
-        test.addCleanup(self.process.wait)
-        test.addCleanup(self.process.kill)
-
-    def url(self, begin=""):
-        for line in self.process.stdout:
-            if line.startswith(begin) and "://" in line:
-                return line.split()[-1]
-        raise AssertionError("no URL: " + self.said())
-
-    def said(self):
-        self.log.seek(0)
-        return self.log.read()
 
 
 class ConferenceRoom(unittest.TestCase):
@@ -190,61 +169,37 @@ class Microassembly(unittest.TestCase):
             wait_for(lambda: ran("get", self.cameras, "microscopes/3/picture").returncode == 0)
 
 
-class CreateMinimal(unittest.TestCase):
-    def setUp(self):
-        self.robot = Robot()
-        self.addCleanup(self.robot.unplug)
-        self.program = Program(self, CREATE, self.robot.device, 0)
-        self.url = self.program.url()
+class CreateMinimal(SerialScenarios, unittest.TestCase):
+    COMMAND = [CREATE]
+    RRGATE = RRGATE
 
-    def test_the_robot_is_started_and_driven(self):
-        self.robot.heard([150, 0])
-        self.assertEqual(self.robot.commands, [[128], [132], [150, 0]])
-        rrgate("call", self.url, "Drive", "-200", "500")
-        self.robot.heard([137, 0xff, 0x38, 0x01, 0xf4])
-        self.robot.heard([137, 0, 0, 0x7f, 0xff])  # the client that drives it is gone
-        for arguments in (("501", "0"), ("-501", "0"), ("100", "2001")):
-            refused = ran("call", self.url, "Drive", *arguments)
-            self.assertIn("expected -", refused.stderr)
-        self.assertEqual(len(self.robot.commands), 5)
 
-    def test_the_stream_is_read_and_what_is_no_packet_left_out(self):
-        watch = Program(self, RRGATE, "watch", self.url, "Bump", "--count", 1, "--json")
-        # Nobody streams: the robot says this all the same, as one does that was switched on before.
-        spoilt = bytearray(self.robot.packet(distance=1000))
-        spoilt[5] ^= 1
+class MoreRobots(unittest.TestCase):
+    def demo(self, name):
+        gateway = Program(self, RRGATE, "demo", name, "--port", 0)
+        self.addCleanup(gateway.process.terminate)
+        return gateway.url("rrgate demo: http://127") + "devices/"
 
-        def bumps():
-            self.robot.say(b"\x01\x13" + bytes(spoilt) + self.robot.packet(distance=-3, angle=2)[:-4])
-            self.robot.say(self.robot.packet() + self.robot.packet(bumps=2))
-            return watch.process.poll() is not None
+    def test_the_robot_on_a_simulated_line_drives_until_a_wall(self):
+        url = self.demo("create-minimal") + "create?service=Create"
+        self.assertIn("experimental.create.Create", rrgate("info", url))
+        rrgate("call", url, "StartStreaming")
+        watch = Program(self, RRGATE, "watch", url, "Bump", "--count", 1)
+        rrgate("call", url, "Drive", "500", "32767")
+        wait_for(lambda: get(url, "DistanceTraveled") > 100)
+        self.assertEqual(watch.process.wait(DEADLINE), 0)
+        self.assertTrue(1900 < get(url, "DistanceTraveled") <= 2000)
+        self.assertEqual((get(url, "Bumpers"), get(url, "AngleTraveled")), (3, 0))
+        rrgate("call", url, "Drive", "-100", "1")
+        wait_for(lambda: get(url, "AngleTraveled") < -20)
 
-        wait_for(bumps)
-        wait_for(lambda: get(self.url, "Bumpers") == 2)
-        self.assertEqual(get(self.url, "DistanceTraveled"), 0)
-        half = self.robot.packet(distance=-300, angle=-90)
-        self.robot.say(half[:7])
-        self.assertEqual(get(self.url, "DistanceTraveled"), 0)
-        self.robot.say(half[7:] + self.robot.packet(distance=100, angle=30))
-        wait_for(lambda: get(self.url, "DistanceTraveled") == -200)
-        self.assertEqual(get(self.url, "AngleTraveled"), -60)
-        self.assertNotEqual(ran("set", self.url, "Bumpers", "0").returncode, 0)
-
-    def test_it_streams_while_somebody_wants_it(self):
-        rrgate("call", self.url, "StartStreaming")  # and is gone
-        self.robot.heard([148, 4, 7, 19, 20, 18])
-        wait_for(lambda: self.robot.commands.count([150, 0]) == 2)
-
-    def test_a_line_that_goes_away_is_told_and_ends_the_program(self):
-        self.robot.heard([150, 0])
-        self.robot.unplug()
-        self.assertEqual(self.program.process.wait(DEADLINE), 1)
-        self.assertIn("is gone: ", self.program.said())
-
-    def test_a_line_that_is_not_there_is_told(self):
-        done = subprocess.run([CREATE, "/dev/no-robot"], capture_output=True, text=True, timeout=DEADLINE)
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("/dev/no-robot", done.stderr)
+    def test_each_robot_of_the_fleet_drives_by_itself(self):
+        devices = self.demo("fleet")
+        urls = [f"{devices}robot-{number}?service=Create" for number in range(1, 7)]
+        for url in urls[::2]:
+            rrgate("call", url, "Drive", "100", "32767")
+        wait_for(lambda: all(get(url, "DistanceTraveled") > 20 for url in urls[::2]))
+        self.assertEqual([get(url, "DistanceTraveled") for url in urls[1::2]], [0, 0, 0])
 
 
 if __name__ == "__main__":

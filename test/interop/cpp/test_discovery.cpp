@@ -48,9 +48,14 @@ Json describe(const rr::NodeDiscoveryInfo& node) {
   return out;
 }
 
-std::shared_ptr<rr::Service> make_thing(const std::string& name) {
+/// `device`  what the standard types name a device: NAME|UUID.
+std::shared_ptr<rr::Service> make_thing(const std::string& name, const std::string& device = "") {
   auto service = rr::Service::from_text({definition}, name, "Thing");
   service->property("one").get([] { return 1; });
+  if (!device.empty()) {
+    service->set_attribute("device", rr::Value(device));
+    service->set_attribute("tags", rr::Value(name));
+  }
   return service;
 }
 
@@ -89,11 +94,12 @@ void serve(const std::string& name, const std::string& id, const std::string& po
   options.id = rr::parse_node_id(id).value();
   rr::Node node(io, name, options);
   rr::Discovery discovery(io, options_for(ip));
-  node.add(make_thing("thing"));
+  const auto device = name + "|" + id;
+  node.add(make_thing("thing", device));
   say({{"port", node.listen("rr+tcp://[::]:" + port)}});
   discovery.announce(node);
   int more = 0;
-  const Input input(io, [&] { node.add(make_thing("thing" + std::to_string(++more))); });
+  const Input input(io, [&] { node.add(make_thing("thing" + std::to_string(++more), device)); });
   io.run();
 }
 

@@ -5,9 +5,13 @@ found_node.py serve-local NAME [public]         the same by rr+local alone, with
 found_node.py call-local URL                    what the thing at this rr+local URL says
 found_node.py find-type TYPE                    its services, on nodes that it hears of within three seconds
 found_node.py detected [ipv4]                   those nodes
+found_node.py subscribe-type TYPE               connections to its services that come, with what their property "one" is, and go
+found_node.py connect-device TYPE DEVICE TAG    the same of the service whose attributes have this device and tag, by the
+                                                DeviceConnector of robotraconteurcompanion
 """
 import json
 import sys
+import threading
 import time
 
 import RobotRaconteur as RR
@@ -69,6 +73,36 @@ def search(what, argument=None):
             print(json.dumps([str(each.ToString()).strip("{}") for each in found]))
 
 
+def say_event(event, service, one):
+    print(json.dumps({"event": event, "id": service.NodeID.ToString().strip("{}"), "service": service.ServiceName, "one": one}),
+          flush=True)
+
+
+def follow(subscription):
+    """Until standard input ends."""
+    def say_connected(_, service, client):
+        threading.Thread(target=lambda: say_event("connected", service, client.one), daemon=True).start()
+
+    subscription.ClientConnected += say_connected  # a connection takes longer than to get here
+    subscription.ClientDisconnected += lambda _, service, client: say_event("lost", service, None)
+    print(json.dumps({"ready": True}), flush=True)
+    sys.stdin.read()
+
+
+def subscribe_type(type_name):
+    with RR.ClientNodeSetup(argv=options("", "discovery-listening-enable=true")):
+        follow(RR.RobotRaconteurNode.s.SubscribeServiceByType([type_name]))
+
+
+def connect_device(type_name, device, tag):
+    from RobotRaconteurCompanion.Util.DeviceConnector import DeviceConnector, DeviceConnectorDetails
+    with RR.ClientNodeSetup(argv=options("", "discovery-listening-enable=true")):
+        details = DeviceConnectorDetails("thing", device=device, tags=[tag], root_object_type=type_name)
+        connector = DeviceConnector([details])
+        follow(connector.GetDevice("thing"))
+        connector.Close()
+
+
 if __name__ == "__main__":
     if sys.argv[1] == "serve":
         serve(*sys.argv[2:])
@@ -76,5 +110,9 @@ if __name__ == "__main__":
         serve_local(*sys.argv[2:])
     elif sys.argv[1] == "call-local":
         call_local(*sys.argv[2:])
+    elif sys.argv[1] == "subscribe-type":
+        subscribe_type(*sys.argv[2:])
+    elif sys.argv[1] == "connect-device":
+        connect_device(*sys.argv[2:])
     else:
         search(*sys.argv[1:])

@@ -124,6 +124,7 @@ class RandomRules {
 TEST_CASE("rights: every verb, path and role, against a plain model of the rules") {
   std::size_t allowed = 0;
   std::size_t refused = 0;
+  std::map<Extent, std::size_t> extents;
   for (unsigned seed = 0; seed < 400; ++seed) {
     INFO("seed " << seed);
     RandomRules random(seed);
@@ -132,6 +133,7 @@ TEST_CASE("rights: every verb, path and role, against a plain model of the rules
     const auto identity = random.identity();
     for (const auto& device : all_devices) {
       bool has_all = true;
+      std::map<Verb, std::set<bool>> found;  // of members: whether some are allowed, and some not
       for (const auto& service : all_services)
         for (const auto& path : all_paths) {
           if (!path.starts_with(service)) continue;
@@ -150,15 +152,24 @@ TEST_CASE("rights: every verb, path and role, against a plain model of the rules
                 REQUIRE(rules.sees(identity, device, service));
                 REQUIRE(rules.sees(identity, device, service, path));
               }
+              if (!member.empty()) found[verb].insert(expected);
               if (!expected && verb <= Verb::lock) has_all = false;  // a recording is the gateway's own
             }
         }
       // Bytes that nobody reads pass for those alone who could have done anything.
       if (rules.check_whole_device(identity, device)) REQUIRE(has_all);
+      for (const auto verb : device_verbs) {
+        const auto extent = rules.extent(identity, device, verb);
+        INFO("extent of " << to_string(verb) << " on " << device << ": " << to_string(extent));
+        if (extent == Extent::all) REQUIRE(found[verb] == std::set<bool>{true});
+        if (extent == Extent::none) REQUIRE(found[verb] == std::set<bool>{false});
+        ++extents[extent];
+      }
     }
   }
   CHECK(allowed > 10'000);
   CHECK(refused > 10'000);
+  for (const auto extent : {Extent::none, Extent::some, Extent::all}) CHECK(extents[extent] > 50);
 }
 
 TEST_CASE("rights: without rules those may everything who have proven who they are") {
@@ -174,6 +185,9 @@ TEST_CASE("rights: without rules those may everything who have proven who they a
   CHECK(AccessRules().sees_any(Identity{}));
   CHECK(rules.sees_any(who("alice", {})));
   CHECK_FALSE(rules.sees_any(Identity{}));
+  CHECK(AccessRules().gives_any(Identity{}, Verb::record));
+  CHECK(rules.gives_any(who("alice", {}), Verb::record));
+  CHECK_FALSE(rules.gives_any(Identity{}, Verb::record));
 }
 
 TEST_CASE("agents: what moves a device is given by rules for agents alone, and those give nothing by any other face") {
@@ -277,6 +291,40 @@ TEST_CASE("rights: all of a device is what rules give that name no service, path
             .check_whole_device(who("x", {"a", "b"}), "arm1"));
 }
 
+TEST_CASE("rights: how much of a device somebody may do something to") {
+  const auto extent = [&](AccessRule rule, Verb verb = Verb::call) {
+    rule.roles = {"r"};
+    return to_string(AccessRules({std::move(rule)}, true).extent(who("a", {"r"}), "arm1", verb));
+  };
+  const std::vector<Verb> call{Verb::call}, record{Verb::record};
+  CHECK(extent({.may = call}) == "all");
+  CHECK(extent({.devices = {"arm*"}, .services = {"*"}, .paths = {"**"}, .members = {"*"}, .may = call}) == "all");
+  CHECK(extent({.services = {"Arm"}, .may = call}) == "some");
+  CHECK(extent({.paths = {"Arm.tool"}, .may = call}) == "some");
+  CHECK(extent({.members = {"Drive"}, .may = call}) == "some");
+  CHECK(extent({.devices = {"create"}, .may = call}) == "none");
+  CHECK(extent({.may = call}, Verb::write) == "none");
+  CHECK(extent({.may = call, .agent = AgentTerms{}}) == "none");  // for agents alone
+  // Recordings are of whole services: a rule about less gives none.
+  CHECK(extent({.may = record}, Verb::record) == "all");
+  CHECK(extent({.services = {"Arm"}, .may = record}, Verb::record) == "some");
+  CHECK(extent({.paths = {"Arm.tool"}, .may = record}, Verb::record) == "none");
+  CHECK(extent({.members = {"Drive"}, .may = record}, Verb::record) == "none");
+  // Two rules that together give it on everything.
+  const AccessRules halves({AccessRule{.roles = {"r"}, .services = {"Arm"}, .may = call},
+                            AccessRule{.roles = {"r"}, .services = {"Create"}, .may = call}},
+                           true);
+  CHECK(halves.extent(who("a", {"r"}), "arm1", Verb::call) == Extent::some);
+  // Without rules.
+  CHECK(AccessRules().extent(Identity{}, "arm1", Verb::call) == Extent::all);
+  CHECK(AccessRules({}, true).extent(Identity{}, "arm1", Verb::call) == Extent::none);
+  CHECK(AccessRules({}, true).extent(who("a", {}), "arm1", Verb::call) == Extent::all);
+  auto agent = who("a", {});
+  agent.face = Face::mcp;
+  CHECK(AccessRules({}, true).extent(agent, "arm1", Verb::call) == Extent::none);
+  CHECK(AccessRules({}, true).extent(agent, "arm1", Verb::read) == Extent::all);
+}
+
 TEST_CASE("rights: a device is seen by those who may do something with it, and by no one else") {
   const std::vector<AccessRule> list{
       AccessRule{
@@ -295,6 +343,10 @@ TEST_CASE("rights: a device is seen by those who may do something with it, and b
   CHECK(rules.sees_any(viewer));
   CHECK_FALSE(rules.sees_any(watcher));
   CHECK_FALSE(rules.sees_any(who("stranger", {})));
+  CHECK(rules.gives_any(viewer, Verb::read));
+  CHECK_FALSE(rules.gives_any(viewer, Verb::call));
+  CHECK(rules.gives_any(watcher, Verb::metrics));
+  CHECK_FALSE(rules.gives_any(who("stranger", {}), Verb::read));
   CHECK(rules.sees(viewer, "arm1", "Arm"));
   CHECK_FALSE(rules.sees(viewer, "arm1", "Create"));
   CHECK_FALSE(rules.sees(viewer, "create", "Arm"));

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "server/access/audit_tail.hpp"
 #include "server/access/audit_trail.hpp"
 #include "test/support/print.hpp"
 
@@ -287,4 +288,76 @@ TEST_CASE("a full disk keeps nobody waiting; what does not fit into memory is lo
   CHECK(text.find("\"event\":\"resumed\"") != std::string::npos);
   CHECK(text.find(std::to_string(lost) + " records were lost") != std::string::npos);
   CHECK(findings_of({folder.file()}).empty());
+}
+
+namespace {
+
+/// The numbers of the records that are found, the newest first.
+std::vector<std::uint64_t> tail_of(const AuditConfig& config, std::size_t limit, const AuditFilter& filter = {}) {
+  const auto tail = read_audit_tail(config, filter, limit);
+  REQUIRE(tail);
+  std::vector<std::uint64_t> out;
+  for (const auto& line : tail->records) out.push_back(nlohmann::json::parse(line)["seq"]);
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("the newest records are read from the end, through renamed files, up to as many as are wanted") {
+  const Folder folder;
+  const AuditConfig config{.file = folder.file(), .max_bytes = 40'000, .keep = 20};
+  write_log(config, 1000);  // about 300 bytes each: some files, each with more than a block or less
+  REQUIRE(fs::exists(folder.file("audit.2")));
+  std::vector<std::uint64_t> all;
+  for (std::uint64_t seq = 1002; seq > 0; --seq) all.push_back(seq);
+  CHECK(tail_of(config, 2000) == all);
+  CHECK(read_audit_tail(config, {}, 1002)->is_all);
+  CHECK_FALSE(read_audit_tail(config, {}, 1001)->is_all);
+  CHECK(tail_of(config, 3) == std::vector<std::uint64_t>{1002, 1001, 1000});
+  CHECK(tail_of(config, 9, {.user = "alice"}).size() == 9);
+  CHECK(tail_of(config, 9, {.user = "bob"}).empty());
+  CHECK(tail_of(config, 9, {.user = "a*", .since = "9"}).empty());
+
+  // One large file: blocks end anywhere within its lines.
+  const AuditConfig whole{.file = folder.file("whole")};
+  write_log(whole, 1000);
+  CHECK(tail_of(whole, 2000) == all);
+}
+
+TEST_CASE("the end of an audit log that is cut, foreign or renamed meanwhile is read as far as it goes") {
+  const Folder folder;
+  const AuditConfig config{.file = folder.file()};
+  write_log(config, 3);
+  {
+    std::ofstream out(config.file, std::ios::app);
+    out << "no record\n{\"seq\":6,\"half";
+  }
+  CHECK(tail_of(config, 9) == std::vector<std::uint64_t>{5, 4, 3, 2, 1});
+  fs::copy_file(config.file, config.file + ".1");  // as if it was renamed after it was read
+  CHECK(tail_of(config, 9) == std::vector<std::uint64_t>{5, 4, 3, 2, 1});
+  CHECK(read_audit_tail(config, {}, 5)->is_all);
+}
+
+TEST_CASE("an audit log that can't be read from its end says why") {
+  const Folder folder;
+  const auto gone = read_audit_tail({.file = folder.file()}, {}, 1);
+  REQUIRE_FALSE(gone);
+  CHECK(gone.error().code == rr::ErrorCode::io_error);
+  CHECK_THAT(gone.error().message, Catch::Contains("No such file"));
+  const auto null = read_audit_tail({.file = "/dev/null"}, {}, 1);
+  REQUIRE_FALSE(null);
+  CHECK(null.error().code == rr::ErrorCode::invalid_state);
+}
+
+TEST_CASE("no more than the last 8 MiB of an audit log are looked at") {
+  const Folder folder;
+  const AuditConfig config{.file = folder.file()};
+  write_log(config, 1);
+  auto lines = lines_of(config.file);
+  lines.insert(lines.begin() + 2, std::string(9 * 1024 * 1024, 'x'));
+  write_lines(config.file, lines);
+  const auto tail = read_audit_tail(config, {}, 9);
+  REQUIRE(tail);
+  CHECK(tail->records.size() == 1);
+  CHECK_FALSE(tail->is_all);
 }

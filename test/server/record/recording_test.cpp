@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 
+#include "server/json/schema.hpp"
 #include "server/record/recording.hpp"
 #include "test/support/folder.hpp"
 #include "test/support/print.hpp"
@@ -32,21 +33,29 @@ struct Recorded {
   rr::TypeRegistry types;
   RecordedService service;
   const rr::EntityDefinition* robot = nullptr;
+  rr::OrderedJson named = {};
 
-  Recorded() {
-    REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+  explicit Recorded(const std::string& text = definition) {
+    REQUIRE(types.add({text}, rr::RobdefMode::strict));
+    named = rr::named_type_schemas(types);
     robot = types.find_entity("com.x.Robot");
     service.service = "Robot";
     service.url = "rr+tcp://h:1/?service=Robot";
     service.type = "com.x.Robot";
     service.node.name = "my.robot";
-    service.definitions = {definition};
+    service.definitions = {text};
     service.objects = {{"Robot", "com.x.Robot"}};
   }
   std::uint16_t add(RecordingWriter& writer, const char* member) {
-    return writer.add_member(service, "Robot", "", *robot->find_member(member), types).value();
+    return writer.add_member(service, "Robot", "", *robot->find_member(member), named).value();
   }
 };
+
+/// As of a recording that has no other schemas.
+rr::OrderedJson schema_of(const Recorded& robot, const char* member) {
+  auto nodes = max_schema_nodes;
+  return recorded_schema(*robot.robot->find_member(member), robot.named, nodes);
+}
 
 rr::OrderedJson value(int number) {
   return {{"value", number}};
@@ -144,7 +153,7 @@ TEST_CASE("the files that follow leave those of an earlier recording alone, unle
 
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {
   const Recorded robot;
-  const auto pose = recorded_schema(*robot.robot->find_member("pose"), robot.types);
+  const auto pose = schema_of(robot, "pose");
   const auto text = pose.dump();
   CHECK(text.find("$ref") == std::string::npos);
   CHECK(text.find("oneOf") == std::string::npos);
@@ -152,11 +161,123 @@ TEST_CASE("schemas have no references and no choices, as tools read them that pl
   CHECK(fields["position"]["items"]["type"] == "number");
   CHECK(fields["mode"]["type"] == "string");
   CHECK(fields["history"]["type"] == "array");
-  CHECK(recorded_schema(*robot.robot->find_member("moved"), robot.types)["properties"]["count"]["type"] == "integer");
-  const auto picture = recorded_schema(*robot.robot->find_member("picture"), robot.types)["properties"]["value"];
+  CHECK(schema_of(robot, "moved")["properties"]["count"]["type"] == "integer");
+  const auto picture = schema_of(robot, "picture")["properties"]["value"];
   CHECK(picture["contentEncoding"] == "base64");
-  const auto matrix = recorded_schema(*robot.robot->find_member("matrix"), robot.types)["properties"]["value"];
+  const auto matrix = schema_of(robot, "matrix")["properties"]["value"];
   CHECK(matrix["properties"]["dims"]["type"] == "array");
+}
+
+TEST_CASE("a definition whose schemas would have no end gives one that says little") {
+  std::string text = "service com.x\nstdver 0.10\n";
+  for (int i = 0; i < 10; ++i) {
+    text += "struct S" + std::to_string(i) + "\n";
+    for (const auto* field : {"a", "b", "c", "d", "e", "f", "g", "h"})
+      text += "    field " + (i == 9 ? std::string("double") : "S" + std::to_string(i + 1)) + " " + field + "\n";
+    text += "end\n";
+  }
+  text += "object Robot\n    wire S0 large\n    wire S8 small\n    event moved(S8 by, S0 to)\n";
+  for (int i = 0; i < 1000; ++i) text += "    property S8 p" + std::to_string(i) + "\n";
+  const Recorded robot(text + "end\n");
+  CHECK(schema_of(robot, "large") == rr::OrderedJson{{"type", "object"}});
+  CHECK(schema_of(robot, "moved") == rr::OrderedJson{{"type", "object"}});
+  const auto small = schema_of(robot, "small");
+  CHECK(small["properties"]["value"]["properties"]["h"]["properties"]["a"]["type"] == "number");
+  auto nodes = max_schema_nodes;
+  std::size_t bytes = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const auto name = "p" + std::to_string(i);
+    bytes += recorded_schema(*robot.robot->find_member(name), robot.named, nodes).dump().size();
+  }
+  CHECK(nodes < 10);
+  CHECK(bytes < 64 * max_schema_nodes);
+  CHECK(bytes > 2 * max_schema_nodes);
+}
+
+TEST_CASE("documentation without end is no part of a schema") {
+  const std::string doc(200'000, 'x');
+  const Recorded robot("service com.x\nstdver 0.10\nstruct S\n    ## " + doc +
+                       "\n    field double a\nend\nobject Robot\n    wire S pose\n    ## " + doc +
+                       "\n    wire double gain\nend\n");
+  CHECK(schema_of(robot, "pose") == rr::OrderedJson{{"type", "object"}});
+  CHECK(schema_of(robot, "gain") == rr::OrderedJson{{"type", "object"}});
+}
+
+TEST_CASE("a clock that is set back stops no time") {
+  const test::Folder folder;
+  Recorded robot;
+  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  for (const int seconds : {100, 101, 50, 51, 52, 40, 41, 108, 109})
+    REQUIRE(writer.write(pose, value(seconds), {}, {seconds, 0}));
+  REQUIRE(writer.close());
+  auto recording = Recording::open(writer.path()).value();
+  std::vector<McapTime> seconds;
+  for (const auto& chunk : recording.chunks())
+    for (const auto& message : recording.read(chunk).value().messages)
+      seconds.push_back(message.log_time / 1'000'000'000u);
+  CHECK(seconds == std::vector<McapTime>{100, 101, 101, 102, 103, 103, 104, 108, 109});
+}
+
+TEST_CASE("a file whose index takes too much memory is followed by the next") {
+  const test::Folder folder;
+  Recorded robot;
+  RecordingOptions options;
+  options.max_index_bytes = 1000;
+  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+    REQUIRE(writer.flush());
+  }
+  REQUIRE(writer.close());
+  CHECK(writer.path() != folder.path("a.mcap"));
+  std::size_t messages = 0;
+  std::size_t files = 0;
+  for (const auto& each : std::filesystem::directory_iterator(std::filesystem::path(writer.path()).parent_path())) {
+    messages += Recording::open(each.path().string()).value().message_count();
+    ++files;
+  }
+  CHECK(messages == 100);
+  CHECK(files > 5);
+  CHECK(files < 20);
+}
+
+TEST_CASE("files of former runs count among those that are kept, and go before the next begins") {
+  const test::Folder folder;
+  RecordingOptions options;
+  options.max_bytes = 20'000;
+  options.kept_files = 3;
+  options.ring = "mine";
+  options.former = {folder.path("1.mcap"), folder.path("2.mcap"), folder.path("3.mcap"), folder.path("4.mcap")};
+  for (const auto& path : options.former) std::ofstream(path) << "of before";
+  options.replaces = true;  // a folder stands in the way
+  std::filesystem::create_directory(folder.path("a-2.mcap"));
+  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
+  CHECK(writer.kept() == std::deque<std::string>{folder.path("3.mcap"), folder.path("4.mcap")});
+  CHECK(recorded_ring(folder.path("a.mcap")) == "mine");
+  Recorded robot;
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  rr::Result<> written;
+  std::uint64_t size = 0;
+  for (int i = 0; written; ++i) {
+    size = writer.size();
+    written = writer.write(pose, value(i), {}, {i, 0});
+  }
+  CHECK_THAT(written.error().message, Catch::Contains("a-2.mcap: can't be written: Is a directory"));
+  CHECK(!std::filesystem::exists(folder.path("3.mcap")));
+  CHECK(std::filesystem::exists(folder.path("4.mcap")));
+  CHECK(std::filesystem::is_directory(folder.path("a-2.mcap")));
+  CHECK(writer.size() < size * 3 / 2);  // not twice
+  CHECK(recorded_ring(folder.path("4.mcap")).empty());
+  CHECK(writer.drop_oldest());
+  CHECK(!std::filesystem::exists(folder.path("4.mcap")));
 }
 
 TEST_CASE("what is no recording says so") {

@@ -5,6 +5,7 @@
 #include <future>
 #include <thread>
 
+#include "server/json/schema.hpp"
 #include "server/record/recorder.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/support/folder.hpp"
@@ -286,7 +287,7 @@ TEST_CASE("what a wire sends after the replay went back is newer than all before
   service.objects = {{"Dev", "com.dev.Dev"}};
   REQUIRE(writer.add_service(service));
   const auto* count = types.find_entity("com.dev.Dev")->find_member("count");
-  const auto channel = writer.add_member(service, "Dev", "", *count, types).value();
+  const auto channel = writer.add_member(service, "Dev", "", *count, rr::named_type_schemas(types)).value();
   // The values are a second apart, and reached the recorder at once.
   for (int i = 1; i <= 3; ++i) REQUIRE(writer.write(channel, {{"value", i}}, rr::TimeSpec{i, 0}, {5, i}));
   REQUIRE(writer.close());
@@ -378,8 +379,8 @@ TEST_CASE("what can't be recorded is told, and the rest recorded") {
   const auto some = record(folder, {"count", "nonesuch", "axes/y/angle", "go"});
   REQUIRE(some.begun);
   REQUIRE(some.problems.size() == 3);
-  CHECK_THAT(some.problems[0], Catch::Contains("nonesuch: no member to record; com.dev.Dev has: count, words, said"));
-  CHECK_THAT(some.problems[1], Catch::Contains("axes/y/angle: "));
+  CHECK_THAT(some.problems[0], Catch::Contains("'nonesuch': no member to record; com.dev.Dev has: count, words, said"));
+  CHECK_THAT(some.problems[1], Catch::Contains("'axes/y/angle': "));
   const test::Folder other;
   const auto none = record(other, {"axes/x"});
   REQUIRE(!none.begun);
@@ -399,7 +400,7 @@ TEST_CASE("a recording whose parts do not go together is not served") {
     const auto before = service;
     spoil(service);
     REQUIRE(writer.add_service(service));
-    REQUIRE(writer.add_member(before, "Dev.axes[x]", "axes/x", *angle, types));
+    REQUIRE(writer.add_member(before, "Dev.axes[x]", "axes/x", *angle, rr::named_type_schemas(types)));
     REQUIRE(writer.close());
     boost::asio::io_context io;
     try {

@@ -162,6 +162,26 @@ TEST_CASE("a dead-man's time has bounds, and so has the number of leases") {
   CHECK(t.takes(1, "s", 50ms) == ErrorCode::none);
   CHECK(t.releases(1) == ErrorCode::none);
   int held = 0;
-  while (t.takes(1, "s.x[" + std::to_string(held) + "]") == ErrorCode::none) ++held;
-  CHECK(held == 1024);
+  const auto takes_all = [&](LockClient client) {
+    const auto before = held;
+    while (t.takes(client, "s.x[" + std::to_string(held) + "]") == ErrorCode::none) ++held;
+    return held - before;
+  };
+  for (LockClient client = 1; client <= 8; ++client) CHECK(takes_all(client) == 128);
+  CHECK(takes_all(9) == 0);
+  CHECK(t.takes(1, "s.x[0]", 200ms) == ErrorCode::none);
+  CHECK(t.takes(9, "s.x[0]", 300ms, true) == ErrorCode::none);
+  CHECK(t.takes(1, "s.x[0]", 300ms, true) == ErrorCode::none);
+}
+
+TEST_CASE("who lets leases end and releases none of them has no more, and keeps nobody from theirs") {
+  Transcript t;
+  int lost = 0;
+  for (; t.takes(1, "s.x[" + std::to_string(lost) + "]") == ErrorCode::none; ++lost) t.now += 300ms;
+  CHECK(lost == 128);
+  CHECK(t.takes(1, "s.x[0]") == ErrorCode::none);  // one of those that it has lost
+  CHECK(t.takes(2, "s.y") == ErrorCode::none);
+  CHECK(t.takes(2, "s.x[0]", 300ms, true) == ErrorCode::none);
+  CHECK(t.releases(1, "s.x[1]") == ErrorCode::none);
+  CHECK(t.takes(1, "s.z") == ErrorCode::none);
 }

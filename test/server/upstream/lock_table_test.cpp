@@ -522,3 +522,84 @@ TEST_CASE("a monitor that the device gives to one who has left goes to the next"
   t.answered(second);
   CHECK(t.may(second));
 }
+
+TEST_CASE("it is known whether another client has locked something below an object") {
+  Transcript t;
+  const auto one = t.shares(1);
+  const auto other = t.shares(2, "alice");
+  const auto hers = t.shares(3, "alice");
+  const auto is_free = [&](LockClient client, std::string_view path = "s") {
+    return t.table.check_below(client, path).has_value();
+  };
+  t.takes(other, LockCommand::lock_for_user, shared, "s.arm");
+  CHECK_FALSE(is_free(one));
+  CHECK(is_free(one, "s.arm"));
+  CHECK(is_free(one, "s.a"));
+  CHECK(is_free(other));
+  CHECK(is_free(hers));
+  t.wants(other, LockCommand::unlock, "s.arm");
+  CHECK_FALSE(is_free(one));
+  t.device_says(t.asked(LockCommand::unlock, shared, "s.arm"));
+  t.answered(other);
+  CHECK(is_free(one));
+  t.wants(other, LockCommand::enter_monitor, "s.tools[01]");
+  CHECK_FALSE(is_free(one));
+  CHECK(is_free(other));
+  CHECK_FALSE(is_free(hers));
+}
+
+TEST_CASE("who may not lock any more has given back what it had, and is told so until it unlocks") {
+  Transcript t;
+  const auto one = t.shares(1);
+  const auto other = t.shares(2);
+  t.takes(one, LockCommand::lock_for_client, shared, "s.arm");
+  t.wants(one, LockCommand::enter_monitor, "s");
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.answered(one);
+  t.wants(other, LockCommand::enter_monitor);
+  CHECK(t.table.paths_of(one) == std::vector<std::string>{"s.arm", "s"});
+  CHECK(t.table.paths_of(other) == std::vector<std::string>{"s"});
+  CHECK(t.table.has_at(one, "s.arm"));
+  CHECK_FALSE(t.table.has_at(other, "s.arm"));
+
+  for (const auto& path : t.table.paths_of(one)) t.table.handle_right_lost(one, path, t.now);
+  t.device_says(t.asked(LockCommand::unlock, shared, "s.arm"));
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.answered(other);
+  CHECK(t.may(other, "s.arm"));
+  CHECK(t.use(one, "s.arm") == ErrorCode::object_locked_error);
+  CHECK(t.table.has_at(one, "s.arm"));
+  t.wants(one, LockCommand::exit_monitor);
+  t.answered(one);
+  t.wants(one, LockCommand::unlock, "s.arm");
+  t.device_says(t.asked(LockCommand::unlock, shared, "s.arm"));
+  t.answered(one);
+  CHECK(t.may(one, "s.arm"));
+  CHECK_FALSE(t.table.has_at(one, "s.arm"));
+  t.nothing_more();
+}
+
+TEST_CASE("a right to lock that is lost while the device is asked leaves nothing behind") {
+  Transcript t;
+  const auto one = t.shares(1);
+  const auto other = t.shares(2);
+  t.wants(one, LockCommand::lock_for_client);
+  const auto lock = t.asked(LockCommand::lock_for_client);
+  t.table.handle_right_lost(one, "s", t.now);
+  t.answered(one, ErrorCode::permission_denied);
+  t.device_says(lock);
+  t.device_says(t.asked(LockCommand::unlock));
+  CHECK(t.may(other));
+  t.wants(one, LockCommand::enter_monitor, "s.arm");
+  const auto enter = t.asked(LockCommand::enter_monitor, shared, "s.arm");
+  t.wants(other, LockCommand::enter_monitor, "s.arm");
+  t.table.handle_right_lost(other, "s.arm", t.now);
+  t.answered(other, ErrorCode::permission_denied);
+  t.table.handle_right_lost(one, "s.arm", t.now);
+  t.answered(one, ErrorCode::permission_denied);
+  t.device_says(enter);
+  t.device_says(t.asked(LockCommand::exit_monitor, shared, "s.arm"));
+  CHECK(t.may(other, "s.arm"));
+  t.nothing_more();
+}

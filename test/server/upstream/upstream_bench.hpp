@@ -20,12 +20,14 @@ namespace rrgate::test {
 
 class UpstreamBench {
  public:
-  explicit UpstreamBench(const std::shared_ptr<rr::Service>& service) : node(io, "test.device") {
+  explicit UpstreamBench(const std::shared_ptr<rr::Service>& service, LeaseConfig leases = {})
+      : node(io, "test.device") {
     node.add(service);
     const auto port = node.listen("rr+tcp://127.0.0.1:0");
     DeviceConfig made;
     made.name = "device";
     made.mode = DeviceMode::shared;
+    made.leases = std::move(leases);
     made.url = rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=" + service->name()).value();
     device = std::make_shared<Device>(io.get_executor(), std::move(made), config);
     upstream = std::make_shared<Upstream>(device, service->name(), UpstreamLogin{});
@@ -75,13 +77,15 @@ class UpstreamBench {
   /// Asks a member of an object that was found.
   std::shared_ptr<std::optional<rr::Result<rr::Value>>> ask(UpstreamClient& client, rr::CallKind kind,
                                                             const std::string& path, const std::string& member,
-                                                            rr::GeneratorId generator = 0) {
+                                                            rr::GeneratorId generator = 0,
+                                                            std::vector<rr::Value> arguments = {}) {
     const auto& type = *upstream->object_type(path);
     rr::Called called;
     called.kind = kind;
     called.object = std::make_shared<SharedObject>(path, type.qualified_name);
     called.member = type.find_member(member);
     called.generator = generator;
+    called.arguments = std::move(arguments);
     auto out = std::make_shared<std::optional<rr::Result<rr::Value>>>();
     upstream->request(client, called, [out](rr::Result<rr::Value> result) { *out = std::move(result); });
     return out;
@@ -104,12 +108,17 @@ class HearingClient final : public UpstreamClient {
 
   std::function<void(rr::EventPacket&)> on_event;
   std::function<void(rr::WirePacket&)> on_wire;
+  std::function<void()> on_lease_ended;
+  std::function<void(const rr::ClientConnection::CallbackReply&)> on_callback;  ///< none: it answers none
   std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
 
  private:
   std::weak_ptr<const void> life() const override { return life_; }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
-  bool may_answer(const std::string&, const rr::MemberDefinition&) const override { return false; }
+  void lease_ended(const std::string&, const std::string&) const override {
+    if (on_lease_ended) on_lease_ended();
+  }
+  bool may_answer(const std::string&, const rr::MemberDefinition&) const override { return on_callback != nullptr; }
   void receive_event(rr::EventPacket& packet) override {
     if (on_event) on_event(packet);
   }
@@ -132,7 +141,7 @@ class HearingClient final : public UpstreamClient {
   void release_path(const std::string& path) override { heard.push_back("released " + path); }
   void call_callback(const std::string&, const rr::MemberDefinition&, std::span<const rr::Value>,
                      rr::ClientConnection::CallbackReply answer) override {
-    answer(rr::make_error(rr::ErrorCode::invalid_operation, "it answers none"));
+    on_callback(answer);
   }
 
   std::shared_ptr<const bool> life_ = std::make_shared<const bool>(true);

@@ -2,7 +2,10 @@
 #include "server/upstream/upstream.hpp"
 
 #include <boost/asio/steady_timer.hpp>
+#include <thread>
 
+#include "server/upstream/lock_table.hpp"
+#include "server/upstream/safe_values.hpp"
 #include "test/server/upstream/upstream_bench.hpp"
 
 using namespace rrgate;
@@ -20,8 +23,12 @@ object Bench
     event struck(int32 number)
     wire double level [readonly]
     wire double wish [writeonly]
+    property int32 number
+    callback int32 ask()
     function int32{generator} count()
     function void wait()
+    function void take(uint8[] bytes)
+    function void stop()
     objref Bench spare
     objref Bench{int32} others
     objref Part{int32} parts
@@ -32,6 +39,9 @@ struct Counting {
   std::shared_ptr<const bool> life = std::make_shared<const bool>(true);
   std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "bench", "Bench");
   std::optional<rr::Reply<void>> waiting;  ///< whoever called wait()
+  std::vector<std::string> commands;       ///< calls of stop(), and values of "wish"
+  std::int32_t number = 1;
+  int reads = 0;  ///< of the number
 
   Counting() {
     service->generator(
@@ -40,6 +50,15 @@ struct Counting {
     service->root().objref("others", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
+    service->function("take", [](const std::vector<std::uint8_t>&) {});
+    service->property("number")
+        .get([this] {
+          ++reads;
+          return number;
+        })
+        .set([this](std::int32_t value) { number = value; });
+    service->function("stop", [this] { commands.emplace_back("stop"); });
+    service->on_wire("wish", [this](double value) { commands.push_back(std::to_string(value)); });
   }
   /// Generators that clients have opened and not closed.
   long open_generators() const { return life.use_count() - 1; }
@@ -311,4 +330,287 @@ TEST_CASE("an index of a plain objref is refused before the device is asked, whi
   CHECK(bench.run_until([&] { return answer.has_value(); }));
   CHECK(asked == 1);
   CHECK((answer && answer->has_error()));
+}
+
+TEST_CASE("what makes a device safe is its last command, whatever a client has sent to a wire before") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  const auto& wire = *bench.upstream->object_type("bench")->find_member("wish");
+  HearingClient client(bench.upstream);
+  bench.upstream->join_wire(client, "bench", wire);
+  REQUIRE(bench.run_until([&] { return !client.heard.empty(); }));
+  const std::vector<rr::Value> much{rr::Value(std::vector<std::uint8_t>(4'000'000))};
+  bench.upstream->connection()->call("bench", "take", much, ignore_result);
+  REQUIRE(bench.upstream->connection()->session().queued_bytes() > 1'000'000);
+  CHECK(bench.upstream->send_wire(client, "bench", wire, rr::Value(100.0)).has_value());
+  const std::vector<SafeAction> actions{{SafeAction::Kind::call, "bench", "stop", "[]"}};
+  const auto safe = std::make_shared<SafeValues>("device", "bench", actions);
+  safe->handle_opened(bench.upstream);
+  CHECK(safe->send("bench", bench.upstream));
+  const auto before = device.commands.size();
+  REQUIRE(bench.run_until([&] { return device.commands.size() >= before + 2; }));
+  bench.find("bench");  // whatever else there is has been sent by then
+  CHECK(device.commands == std::vector<std::string>{"stop", "stop"});
+}
+
+TEST_CASE("what makes safe is known however an index is spelled, and so are rules of leases") {
+  const SafeValues safe("device", "s", {{SafeAction::Kind::call, "s.arms[left_arm]", "stop", "[]"}});
+  for (const std::string path : {"s.arms[left_arm]", "s.arms[left%5farm]", "s.arms[left%5Farm]"}) {
+    CHECK(safe.has(canonical_lock_path(path)));
+    for (const std::string rule : {"s.arms[left_arm].stop", "s.arms[left%5farm].stop", "s.arms[*_arm].stop"}) {
+      LeaseConfig leases;
+      leases.is_offered = true;
+      leases.members = {{rule, LeaseNeed::never}};
+      CHECK(leases.need_of(path + ".stop") == LeaseNeed::never);
+      CHECK(leases.is_urgent("s.arms.left_arm.stop"));
+      CHECK(leases.need_of(path + ".go") == LeaseNeed::covered);
+    }
+  }
+}
+
+TEST_CASE("a client that goes on as another user hears what has become of what it waits for") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient first(bench.upstream);
+  HearingClient second(bench.upstream);
+  std::vector<bool> answers;
+  const auto enter = [&](HearingClient& client) {
+    rr::LockWanted wanted;
+    wanted.id = 1;
+    wanted.command = rr::LockCommand::enter_monitor;
+    wanted.path = "bench";
+    wanted.timeout = -1ms;
+    bench.upstream->lock(client, wanted, [&](const rr::Result<>& result) { answers.push_back(result.has_value()); });
+  };
+  enter(first);
+  REQUIRE(bench.run_until([&] { return answers.size() == 1; }));
+  enter(second);
+  bench.upstream->change_user(second);
+  CHECK(bench.run_until([&] { return answers.size() == 2; }));
+  CHECK(answers == std::vector{true, false});
+}
+
+TEST_CASE("a client that has left is nobody's any more, as whatever user it would go on") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient client(bench.upstream);
+  bench.upstream->remove(client);
+  bench.upstream->change_user(client);
+  bool is_answered = false;
+  rr::LockWanted wanted;
+  wanted.command = rr::LockCommand::enter_monitor;
+  wanted.path = "bench";
+  bench.upstream->lock(client, wanted, [&](const rr::Result<>&) { is_answered = true; });
+  bench.find("bench");
+  CHECK_FALSE(is_answered);
+}
+
+TEST_CASE("a session that is lost because a lease has ended refuses whoever has found that out") {
+  Counting device;
+  LeaseConfig leases;
+  leases.is_offered = true;
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  HearingClient holder(bench.upstream);
+  HearingClient other(bench.upstream);
+  holder.on_lease_ended = [&] {
+    bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+    bench.run_until([&] { return !bench.upstream->is_open(); });
+  };
+  std::optional<bool> is_held;
+  rr::LockWanted wanted;
+  wanted.command = rr::LockCommand::acquire_lease;
+  wanted.path = "bench";
+  wanted.timeout = 100ms;
+  bench.upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
+  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
+  REQUIRE(*is_held);
+  std::this_thread::sleep_for(150ms);
+  const auto asked = bench.ask(other, rr::CallKind::function, "bench", "stop");
+  REQUIRE(asked->has_value());
+  CHECK((*asked)->error().code == rr::ErrorCode::connection_error);
+}
+
+TEST_CASE("thousands who wait for monitors of a device that is lost are all told") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  constexpr std::size_t count = 6000;
+  std::vector<std::unique_ptr<HearingClient>> clients;
+  std::size_t answers = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& client = *clients.emplace_back(std::make_unique<HearingClient>(bench.upstream));
+    rr::LockWanted wanted;
+    wanted.id = 1;
+    wanted.command = rr::LockCommand::enter_monitor;
+    wanted.path = i % 8 == 0 ? "bench" : "bench.others[" + std::to_string(i % 8) + "]";
+    wanted.timeout = -1ms;
+    bench.upstream->lock(client, wanted, [&](const rr::Result<>&) { ++answers; });
+  }
+  bench.upstream->break_off();
+  CHECK(bench.run_until([&] { return answers == count; }));
+}
+
+TEST_CASE("a wire of an object that is looked for is connected for those who are there then") {
+  Counting device;
+  const auto part = device.service->make_object("Part");
+  device.service->root().objref("parts", [&](std::string_view) { return part; });
+  UpstreamBench bench(device.service);
+  bench.open();
+  const auto& level = *bench.upstream->object_type("bench")->find_member("level");
+  HearingClient client(bench.upstream);
+  bench.upstream->join_wire(client, "bench.parts[1]", level);
+  bench.upstream->leave_wire(client, "bench.parts[1]", level);
+  REQUIRE(bench.find("bench.parts[1]").has_value());
+  REQUIRE(bench.find("bench").has_value());
+  CHECK(client.heard.empty());
+  bench.upstream->join_wire(client, "bench", level);
+  bench.upstream->leave_wire(client, "bench", level);
+  bench.upstream->join_wire(client, "bench", level);
+  REQUIRE(bench.run_until([&] { return client.heard.size() == 1; }));
+  bench.find("bench");
+  CHECK(client.heard == std::vector<std::string>{"wire level joined"});
+}
+
+TEST_CASE("a client that has left asks the device for nothing") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient client(bench.upstream);
+  bench.upstream->remove(client);
+  const auto asked = bench.ask(client, rr::CallKind::function, "bench", "stop");
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  REQUIRE_FALSE((**asked).has_value());
+  CHECK((*asked)->error().code == rr::ErrorCode::operation_cancelled);
+  bench.find("bench");
+  CHECK(device.commands.empty());
+}
+
+TEST_CASE("no lease is given above an object that another client has locked") {
+  Counting device;
+  const auto part = device.service->make_object("Part");
+  device.service->root().objref("parts", [&](std::string_view) { return part; });
+  LeaseConfig leases;
+  leases.is_offered = true;
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  REQUIRE(bench.find("bench.parts[1]").has_value());
+  HearingClient first(bench.upstream);
+  HearingClient second(bench.upstream);
+  rr::LockRequestId last = 0;
+  const auto ask = [&](HearingClient& client, rr::LockCommand command, const std::string& path) {
+    std::optional<rr::ErrorCode> answer;
+    rr::LockWanted wanted;
+    wanted.id = ++last;
+    wanted.command = command;
+    wanted.path = path;
+    wanted.timeout = 1000ms;
+    bench.upstream->lock(client, wanted, [&](const rr::Result<>& result) {
+      answer = result ? rr::ErrorCode::none : result.error().code;
+    });
+    REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+    return *answer;
+  };
+  CHECK(ask(first, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  CHECK(ask(second, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::object_locked_error);
+  CHECK(ask(first, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
+}
+
+TEST_CASE("a session that rests is ended behind the answer of what makes the device safe") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->rest_unused(50ms);
+  bench.upstream->keep_open({10s, 10s, 10s});
+  REQUIRE(bench.wait_for(bench.upstream->opened()).has_value());
+  bool is_gone = false;
+  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
+  bench.upstream->make_safe({SafeAction::Kind::call, "bench", "wait", {}}, ignore_result);
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting() && device.waiting.has_value(); }));
+  bool has_passed = false;
+  boost::asio::steady_timer while_it_waits(bench.io, 100ms);
+  while_it_waits.async_wait([&](const auto&) { has_passed = true; });
+  REQUIRE(bench.run_until([&] { return has_passed; }));
+  CHECK_FALSE(is_gone);
+  (*device.waiting)();
+  CHECK(bench.run_until([&] { return is_gone; }));
+}
+
+TEST_CASE("reads are shared, but whoever reads behind a command hears what has come of it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  auto config = bench.device->config();
+  config.shares_reads = true;
+  bench.device->become(config, bench.config);
+  bench.open();
+  HearingClient client(bench.upstream);
+  HearingClient other(bench.upstream);
+  const auto read = [&](HearingClient& by) { return bench.ask(by, rr::CallKind::property_get, "bench", "number"); };
+  const auto first = read(client);
+  const auto second = read(other);
+  const auto written =
+      bench.ask(client, rr::CallKind::property_set, "bench", "number", 0, {rr::Value(std::int32_t{2})});
+  const auto third = read(client);
+  const auto fourth = read(other);
+  REQUIRE(bench.run_until([&] { return fourth->has_value() && third->has_value() && written->has_value(); }));
+  const auto value_of = [](const auto& asked) { return asked->value()->template to<std::int32_t>().value(); };
+  CHECK(value_of(first) == 1);
+  CHECK(value_of(second) == 1);
+  CHECK(value_of(third) == 2);
+  CHECK(value_of(fourth) == 2);
+  CHECK(device.reads == 2);
+}
+
+TEST_CASE("a client that is gone is not asked with all others, and the device has its answer") {
+  Counting device;
+  rr::ClientId session = 0;
+  device.service->on_client_connected([&](rr::ClientId id) { session = id; });
+  UpstreamBench bench(device.service);
+  auto config = bench.device->config();
+  config.callbacks = {{"bench.ask", CallbackPolicy::all}};
+  bench.device->become(config, bench.config);
+  bench.open();
+  HearingClient first(bench.upstream);
+  std::optional<HearingClient> second(std::in_place, bench.upstream);
+  int asked = 0;
+  second->on_callback = [&](const auto&) { ++asked; };
+  first.on_callback = [&](const auto& answer) {
+    second.reset();
+    answer(rr::make_error(rr::ErrorCode::operation_failed, "not this one"));
+  };
+  std::optional<rr::Result<rr::Value>> heard;
+  device.service->call_callback(session, "ask", {}, [&](rr::Result<rr::Value> answer) { heard = std::move(answer); });
+  CHECK(bench.run_until([&] { return heard.has_value(); }));
+  CHECK(asked == 0);
+  CHECK((heard && !*heard));
+}
+
+TEST_CASE("a device that was away when a lease ended is made safe when it is back, though nobody uses it any more") {
+  Counting device;
+  LeaseConfig leases;
+  leases.is_offered = true;
+  leases.safe = {{SafeAction::Kind::call, "bench", "stop", "[]"}};
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  std::optional<HearingClient> holder(std::in_place, bench.upstream);
+  std::optional<bool> is_held;
+  rr::LockWanted wanted;
+  wanted.command = rr::LockCommand::acquire_lease;
+  wanted.path = "bench";
+  wanted.timeout = 10s;
+  bench.upstream->lock(*holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
+  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
+  REQUIRE(*is_held);
+  bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+  REQUIRE(bench.run_until([&] { return !bench.upstream->is_open(); }));
+  holder.reset();
+  bench.upstream->close();
+  const std::weak_ptr<Upstream> before = std::exchange(bench.upstream, nullptr);
+  REQUIRE(bench.run_until([&] { return before.expired(); }));
+  CHECK(device.commands.empty());
+  bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{});
+  bench.open();
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
 }

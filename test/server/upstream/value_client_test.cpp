@@ -1,6 +1,8 @@
 // Listeners of values: what they hear while a member of the device is joined, and when it ends.
 #include "server/upstream/value_client.hpp"
 
+#include <boost/asio/ip/tcp.hpp>
+
 #include "test/server/upstream/upstream_bench.hpp"
 
 using namespace rrgate;
@@ -92,4 +94,41 @@ TEST_CASE("a wire's value of before an outage is given to nobody who comes in it
   const auto second = rack.listen("level");
   REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
   CHECK(rack.heard == std::vector<std::string>{"value", "connection_lost: device 'device': the line was cut"});
+}
+
+TEST_CASE("a client that leaves while it joins a member waits no longer, and joins nothing any more") {
+  const std::string member = GENERATE("news", "level");
+  Rack rack;
+  const auto first = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return rack.client->is_used(); }));
+  rack.client->leave();
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  REQUIRE_FALSE((**first).has_value());
+  CHECK((*first)->error().code == rr::ErrorCode::operation_cancelled);
+  CHECK_FALSE(rack.bench.upstream->has_clients());
+  const auto second = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  REQUIRE_FALSE((**second).has_value());
+  CHECK((*second)->error().code == rr::ErrorCode::operation_cancelled);
+}
+
+TEST_CASE("a login that is judged for a device that has been replaced is given up") {
+  Rack rack;
+  auto& bench = rack.bench;
+  boost::asio::ip::tcp::acceptor silent(bench.io, {boost::asio::ip::address_v4::loopback(), 0});
+  auto config = bench.device->config();
+  config.url = rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(silent.local_endpoint().port()) + "/").value();
+  const auto before = std::make_shared<Device>(bench.io.get_executor(), config, bench.config);
+  ValueClients clients(bench.io.get_executor(), MemoryBudget(1'000'000).charge(""));
+  const SessionKey key{"rack", "alice", "secret"};
+  const auto first = bench.begin(clients.open(before, key));
+  const auto begin = std::chrono::steady_clock::now();
+  const auto second = bench.begin(clients.open(bench.device, key));
+  REQUIRE(bench.run_until([&] { return first->has_value(); }));
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(2));
+  CHECK_FALSE((**first).has_value());
+  clients.stop();
+  before->stop();
+  silent.close();
+  CHECK(bench.run_until([&] { return second->has_value(); }));
 }

@@ -1,7 +1,7 @@
 // What a board is, and its forms: in the address, in this browser's storage, as a file.
 // Layer: web/board, pure but for the storage.
 
-import { settle } from "./layout";
+import { COLUMNS, MOST_COLUMNS, settle } from "./layout";
 import type { Placed } from "./layout";
 import type { StopCall } from "../robot/stop";
 
@@ -38,6 +38,8 @@ export interface Panel extends Placed {
 
 export interface Board {
   panels: readonly Panel[];
+  /** For which the panels were arranged. */
+  columns: number;
   stop: StopCall | null;
 }
 
@@ -46,17 +48,26 @@ const MOST_TEXT = 256 * 1024;
 
 /** @throws Error with what is wrong, where, and what was expected. */
 export function readBoard(json: unknown): Board {
-  const { board, panels, stop } = record(json, "the file");
+  const { board, panels, columns = COLUMNS, stop } = record(json, "the file");
   if (board !== 1) throw new Error(`the file: field "board" is ${say(board)}, expected 1 (a board of this page)`);
   if (!Array.isArray(panels)) throw new Error(`the file: field "panels" is ${say(panels)}, expected a list`);
   if (panels.length > MOST_PANELS)
     throw new Error(`the file: ${panels.length} panels, expected at most ${MOST_PANELS}`);
-  return { panels: settle(panels.map(readPanel)), stop: stop === undefined || stop === null ? null : readStop(stop) };
+  if (typeof columns !== "number" || !Number.isInteger(columns) || columns < COLUMNS || columns > MOST_COLUMNS)
+    throw new Error(
+      `the file: field "columns" is ${say(columns)}, expected a whole number from ${COLUMNS} to ${MOST_COLUMNS}`,
+    );
+  return {
+    panels: settle(panels.map(readPanel), columns),
+    columns,
+    stop: stop === undefined || stop === null ? null : readStop(stop),
+  };
 }
 
-export function writeBoard({ panels, stop }: Board): object {
+export function writeBoard({ panels, columns, stop }: Board): object {
   return {
     board: 1,
+    ...(columns !== COLUMNS && { columns }),
     ...(stop && { stop }),
     panels: panels.map(({ id: _, title, from, object, settings, ...rest }) => ({
       ...rest,

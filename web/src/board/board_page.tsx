@@ -30,7 +30,7 @@ import {
 import type { Board, Panel, PanelKind } from "./board";
 import { Guard } from "./guard";
 import { Keeper } from "./keeper";
-import { findRoom, inOrder, nudge, put, settle } from "./layout";
+import { COLUMNS, findRoom, inOrder, MOST_COLUMNS, nudge, put, settle, spread } from "./layout";
 import { nameOf, PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
 import { StopButton, useSafe } from "./stop";
@@ -58,12 +58,14 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       members: last.members,
       definitions: new Definitions(last.definitions),
       scope: scopeOf(last.type),
+      devices: devicesOf(list.state.value)?.map(({ name }) => name),
     });
   }, [last?.type]);
   const { board, isKept, trouble, setBoard: writeDown, setTrouble } = useBoard(key, route, preset);
   const undo = useUndo(`${key} ${route.board ?? ""}`);
   const grid = useRef<HTMLDivElement>(null);
   const [arranging, setArranging] = useState(false);
+  const columns = useColumns();
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
   const safe = useSafe(route, list);
@@ -87,8 +89,10 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       </div>
     );
   }
+  /** As it stands on this screen; it is kept as it was arranged until somebody arranges it here. */
+  const here: Board = { ...board, panels: spread(board.panels, board.columns, columns), columns };
   const setBoard = (next: Board): void => {
-    if (sameBoard(board, next)) return;
+    if (sameBoard(board, next) || sameBoard(here, next)) return;
     undo.forget();
     writeDown(next);
   };
@@ -102,15 +106,15 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
     writeDown(before, before === preset);
     grid.current?.focus({ preventScroll: true });
   };
-  const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
+  const setPanels = (panels: readonly Panel[]): void => setBoard({ ...here, panels });
   const add = (kind: PanelKind): void => {
     const { w, h } = KINDS[kind];
-    const place = findRoom(board.panels, { w, h });
-    setPanels([...board.panels, { id: makeId(), kind, title: "", from: "", object: "", settings: {}, ...place }]);
+    const place = findRoom(here.panels, { w, h }, columns);
+    setPanels([...here.panels, { id: makeId(), kind, title: "", from: "", object: "", settings: {}, ...place }]);
     setArranging(true);
   };
   const update = (id: string, change: Partial<Panel>): void =>
-    setPanels(board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)));
+    setBoard({ ...board, panels: board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)) });
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
@@ -132,8 +136,8 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
         />
       </div>
       <Failure text={trouble ?? failure} />
-      <div ref={grid} class="board" tabIndex={-1}>
-        {inOrder(board.panels).map((panel) => (
+      <div ref={grid} class="board" tabIndex={-1} style={{ "--columns": String(columns) }}>
+        {inOrder(here.panels).map((panel) => (
           <Guard key={panel.id}>
             <PanelFrame
               panel={panel}
@@ -142,12 +146,12 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
               services={services}
               list={list}
               arranging={arranging}
-              move={(place) => setPanels(put(board.panels, panel.id, place))}
-              step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
+              move={(place) => setPanels(put(here.panels, panel.id, place, columns))}
+              step={(dx, dy) => setPanels(nudge(here.panels, panel.id, dx, dy, columns))}
               update={(change) => update(panel.id, change)}
               remove={() => {
-                const panels = settle(board.panels.filter(({ id }) => id !== panel.id));
-                replace(t("Removed: {0}", nameOf(panel)), { ...board, panels });
+                const left = board.panels.filter(({ id }) => id !== panel.id);
+                replace(t("Removed: {0}", nameOf(panel)), { ...board, panels: settle(left, board.columns) });
               }}
             />
           </Guard>
@@ -219,6 +223,23 @@ function useBoard(key: string, route: ServiceRoute, preset: Board | null): Board
     });
   };
   return { board: shown, isKept: useStore(keeper.isKept), trouble, setBoard, setTrouble };
+}
+
+/** By the width of the window, in CSS pixels; the same cells are then about as large on a wall as on a desk. */
+const WIDER: readonly [from: number, columns: number][] = [
+  [3200, MOST_COLUMNS],
+  [2300, 18],
+];
+
+function useColumns(): number {
+  const count = (): number => WIDER.find(([from]) => window.innerWidth >= from)?.[1] ?? COLUMNS;
+  const [columns, setColumns] = useState(count);
+  useEffect(() => {
+    const look = (): void => setColumns(count());
+    window.addEventListener("resize", look);
+    return () => window.removeEventListener("resize", look);
+  }, []);
+  return columns;
 }
 
 /** Whether all clients share the gateway's connection to the device. */

@@ -9,13 +9,15 @@ import type { Definitions } from "../values/definitions";
 import { isNumeric, parseType } from "../values/type_text";
 import { makeId } from "./board";
 import type { Board, Panel, PanelKind, Settings } from "./board";
-import { settle } from "./layout";
+import { COLUMNS, settle } from "./layout";
 
 export interface Described {
   type: string;
   members: readonly Member[];
   definitions: Definitions;
   scope: string;
+  /** Those of the gateway, by name: a board begins without panels of others. Left out: not known. */
+  devices?: readonly string[] | undefined;
 }
 
 /** `place`: whose members, as those of a Panel: "device/service object". */
@@ -162,6 +164,18 @@ const STANDARD: Readonly<Record<string, Preset>> = {
       ["table", 8, 16, 4, 4, { member: "parts" }],
     ],
   },
+  // Of `rrgate demo conference-room`, whose lights and sensors are other devices.
+  ["experimental.conference_room.Controller"]: {
+    stop: null,
+    panels: [
+      ["form", 0, 0, 4, 9, { members: ["target", "gain", "on"] }, "Target"],
+      ["plot", 4, 0, 8, 9, { member: "mean" }, "Mean of the sensors"],
+      ["plot", 4, 9, 8, 7, { member: "error" }, "Error"],
+      ["table", 0, 9, 4, 7, { member: "shown" }, "Lights", "lights/Lights"],
+      ["table", 0, 16, 6, 8, { member: "readings" }, "Northern sensors", "sensors-north/Sensors"],
+      ["table", 6, 16, 6, 8, { member: "readings" }, "Southern sensors", "sensors-south/Sensors"],
+    ],
+  },
   // Of `rrgate demo baxter`: its arms, cameras and grippers are other services of the device.
   ["experimental.baxter.Base"]: {
     stop: { call: "halt", args: [] },
@@ -215,11 +229,13 @@ function standardOf(type: string, definitions: Definitions) {
 
 export function presetFor(object: Described): Board {
   const standard = standardOf(object.type, object.definitions);
-  if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
+  if (!standard) return { panels: settle(byMembers(object)), columns: COLUMNS, stop: stopFor(object) };
   const panels = standard.panels
-    .filter(([, , , , , settings, , place]) => place !== undefined || isThere(settings, object.members))
+    .filter(([, , , , , settings, , place]) =>
+      place === undefined ? isThere(settings, object.members) : isOfDevices(place, object.devices),
+    )
     .map((spec) => makePanel(spec));
-  return { panels: settle(panels), stop: stopFor(object) };
+  return { panels: settle(panels), columns: COLUMNS, stop: stopFor(object) };
 }
 
 const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;
@@ -297,6 +313,11 @@ function hasNumbers(member: Member, object: Described): boolean {
 function isThere(settings: Settings | undefined, members: readonly Member[]): boolean {
   const named = settings?.["member"] ?? (settings?.["members"] as readonly string[] | undefined)?.[0];
   return named === undefined || members.some(({ name }) => name === named);
+}
+
+function isOfDevices(place: string, devices: readonly string[] | undefined): boolean {
+  const device = place.split("/", 1)[0] ?? "";
+  return devices === undefined || place.startsWith(" ") || devices.includes(device);
 }
 
 function makePanel([kind, x, y, w, h, settings = {}, title = "", place = ""]: Spec): Panel {

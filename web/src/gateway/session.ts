@@ -91,7 +91,7 @@ export class Session {
   async #look(): Promise<void> {
     const asked = ++this.#asked;
     try {
-      const response = await this.#ask("api/v1/access");
+      const response = await this.#ask("api/v1/access?devices=false");
       const answer: unknown = response.ok ? await response.json() : {};
       if (asked !== this.#asked) return; // asked again meanwhile, or signed in or out
       if (response.ok) this.#take(readWho(answer));

@@ -10,6 +10,7 @@ import type { AccessDesk } from "../gateway/access";
 import type { AgentsDesk } from "../gateway/agents";
 import { AccessPart } from "./access_part";
 import { AgentSessionsPart } from "./agent_sessions_part";
+import { AuditPart } from "./audit_part";
 import { DeviceCard } from "./device_card";
 import { DeviceParts } from "./device_parts";
 import { StateBadge } from "../ui/state_badge";
@@ -38,6 +39,7 @@ export function DevicesPage({ list, usb, access, agents }: DevicesPageParts) {
       </p>
       <AccessPart access={access} />
       <AgentSessionsPart agents={agents} />
+      <AuditPart />
     </div>
   );
 }

@@ -23,6 +23,7 @@ import { isCreate } from "../robot/robot_model";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
+import { ReplayBar } from "./replay_bar";
 import { RobotPage } from "./robot_page";
 
 type ServiceRoute = Route & { page: "service" };
@@ -43,8 +44,9 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   const first = useFirstView(link, route, drives);
   const shown = view === "auto" || (view === "drive" && !drives) ? first : view;
   const isDriven = shown === "drive";
+  const width = shown === "members" || onlyStop ? "page-narrow" : `page-wide ${shown === "board" ? "page-wall" : ""}`;
   return (
-    <div class={`page ${shown === "members" || onlyStop ? "page-narrow" : "page-wide"}`}>
+    <div class={`page ${width}`}>
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
@@ -60,6 +62,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
       {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} />}
+      {link && !onlyStop && <ReplayBar link={link} device={device} list={list} />}
       {isMissing && (
         <p class="empty">
           {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}

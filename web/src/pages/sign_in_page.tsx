@@ -7,6 +7,7 @@ import { useStore } from "../app/store";
 import type { Session } from "../gateway/session";
 import { Failure } from "../ui/failure";
 import { AskPart } from "./ask_part";
+import { RightsPart } from "./rights_part";
 
 export function SignInPage({ session, done }: { session: Session; done: () => void }) {
   const [name, setName] = useState("");
@@ -87,16 +88,19 @@ export function Account({ session, ask }: { session: Session; ask: () => void })
   if (!who?.login) return null;
   if (who.user === null)
     return who.roles.length === 0 ? null : (
-      <button class="button" type="button" onClick={ask}>
-        {t("Sign in")}
-      </button>
+      <div class="account">
+        <RightsPart who={who}>{who.roles.join(", ")}</RightsPart>
+        <button class="button" type="button" onClick={ask}>
+          {t("Sign in")}
+        </button>
+      </div>
     );
   const roles = who.roles.length === 0 ? t("no role") : who.roles.join(", ");
   return (
     <div class="account" role="group" aria-label={t("You")}>
-      <p>
+      <RightsPart who={who}>
         <strong>{who.user}</strong> <span class="account-roles">{roles}</span>
-      </p>
+      </RightsPart>
       {who.session && (
         <button
           class="button"

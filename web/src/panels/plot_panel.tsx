@@ -282,7 +282,12 @@ function Canvas({ trace, labels, unit, seconds, paused }: CanvasProps) {
       const end = data[0].length - 1;
       if (!isPointedAt && end >= 0) plot.setLegend({ idxs: data.map((column) => measuredAt(column, end)) }); // the newest
     };
-    const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
+    // In a frame of its own: where the plot stretches its box, the observer would be told again within one, which WebKit calls an error.
+    let resizing = 0;
+    const fit = new ResizeObserver(() => {
+      cancelAnimationFrame(resizing);
+      resizing = requestAnimationFrame(() => plot.setSize(sizeOf(box, plot)));
+    });
     fit.observe(box);
     box.addEventListener("dblclick", zoomOut);
     const look = new IntersectionObserver((seen) => (isInView = seen.at(-1)?.isIntersecting ?? true));
@@ -302,6 +307,7 @@ function Canvas({ trace, labels, unit, seconds, paused }: CanvasProps) {
       unwatch();
       box.removeEventListener("dblclick", zoomOut);
       fit.disconnect();
+      cancelAnimationFrame(resizing);
       look.disconnect();
       plot.destroy();
     };

@@ -63,6 +63,7 @@ export class Picture {
   #isLookedAt = false;
   #shown = "";
   #frame = 0;
+  #resizing = 0;
 
   /** @throws Error where the browser draws no 3-D pictures. */
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -79,7 +80,11 @@ export class Picture {
     canvas.addEventListener("touchstart", keepPair, { passive: false });
     canvas.addEventListener("touchmove", keepPair, { passive: false });
     this.#controls.addEventListener("change", this.#redraw);
-    this.#resized = new ResizeObserver(() => this.#resize());
+    // In a frame of its own, as every change of layout that an observer asks for: within one, WebKit calls it an error.
+    this.#resized = new ResizeObserver(() => {
+      cancelAnimationFrame(this.#resizing);
+      this.#resizing = requestAnimationFrame(() => this.#resize());
+    });
     this.#resized.observe(canvas);
   }
 
@@ -134,6 +139,7 @@ export class Picture {
     cancelAnimationFrame(this.#frame);
     this.#frame = -1; // nothing is drawn any more
     this.#resized.disconnect();
+    cancelAnimationFrame(this.#resizing);
     this.canvas.removeEventListener("touchstart", keepPair);
     this.canvas.removeEventListener("touchmove", keepPair);
     this.#controls.dispose();

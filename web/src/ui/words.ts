@@ -58,3 +58,12 @@ export function ageText(ms: number): string {
   if (ms >= 1000) return `${(ms / 1000).toFixed(1)} s`;
   return ms < 10 ? `${ms.toFixed(1)} ms` : `${Math.round(ms)} ms`;
 }
+
+/** `0:04.2`, `12:30.0`, `1:02:30.0`: a time of a recording. */
+export function timeText(seconds: number): string {
+  const tenths = Math.round(Math.max(0, seconds) * 10);
+  const two = (number: number): string => String(number).padStart(2, "0");
+  const [minutes, rest] = [Math.floor(tenths / 600), tenths % 600];
+  const end = `${two(Math.floor(rest / 10))}.${rest % 10}`;
+  return minutes < 60 ? `${minutes}:${end}` : `${Math.floor(minutes / 60)}:${two(minutes % 60)}:${end}`;
+}

@@ -1,0 +1,124 @@
+// What users did last, for admins. Closed at first; asks when it is opened, and whenever somebody presses Show.
+// Layer: web/pages.
+
+import { useState } from "preact/hooks";
+import { language, t } from "../app/language";
+import { useStore } from "../app/store";
+import { askDeeds } from "../gateway/audit";
+import type { Deed, Deeds } from "../gateway/audit";
+import { session } from "../gateway/session";
+import { useAsked } from "../ui/use_asked";
+import { clockTime, sentence } from "../ui/words";
+
+export function AuditPart() {
+  return useStore(session.who)?.admin ? <Part /> : null;
+}
+
+function Part() {
+  const [open, setOpen] = useState(false);
+  return (
+    <details class="subscriptions audit-part" onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary>{t("What users did")}</summary>
+      {open && <Search />}
+    </details>
+  );
+}
+
+function Search() {
+  const [user, setUser] = useState("");
+  const [device, setDevice] = useState("");
+  const [asked, setAsked] = useState({ user: "", device: "", turn: 0 });
+  const { answer, failure } = useAsked((signal) => askDeeds(asked.user, asked.device, signal), JSON.stringify(asked));
+  return (
+    <>
+      <form
+        class="access-form"
+        onSubmit={(event) => {
+          event.preventDefault();
+          setAsked({ user: user.trim(), device: device.trim(), turn: asked.turn + 1 });
+        }}
+      >
+        <label>
+          {t("User")}{" "}
+          <input
+            type="text"
+            autocapitalize="none"
+            value={user}
+            onInput={(event) => setUser(event.currentTarget.value)}
+          />
+        </label>
+        <label>
+          {t("Device")}{" "}
+          <input
+            type="text"
+            autocapitalize="none"
+            value={device}
+            onInput={(event) => setDevice(event.currentTarget.value)}
+          />
+        </label>
+        <button class="button" type="submit">
+          {t("Show")}
+        </button>
+      </form>
+      <p class="note" role="status">
+        {failure === null ? headline(answer) : sentence(failure)}
+      </p>
+      {answer && answer.list.length > 0 && <DeedTable deeds={answer.list} />}
+    </>
+  );
+}
+
+function headline(answer: Deeds | null): string {
+  if (!answer) return t("Asking the gateway for them.");
+  if (!answer.isRecorded) return t("The gateway keeps no audit log: its configuration names no file for one.");
+  if (answer.list.length === 0)
+    return answer.isAll ? t("Nothing is recorded of that.") : t("Nothing of that is among the newest records.");
+  return answer.isAll ? t("All that is recorded, the newest first.") : t("The newest records; there are older ones.");
+}
+
+/** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
+function DeedTable({ deeds }: { deeds: readonly Deed[] }) {
+  return (
+    <table class="ledger" role="table" aria-label={t("What users did")}>
+      <thead role="rowgroup">
+        <tr role="row">
+          {["Time", "User", "Event", "Member", "State"].map((column) => (
+            <th key={column} role="columnheader" scope="col">
+              {t(column)}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody role="rowgroup">
+        {deeds.map((each) => (
+          <DeedRow key={each.seq} deed={each} />
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function DeedRow({ deed }: { deed: Deed }) {
+  const { at, user, client, event, outcome, device, path, member, detail } = deed;
+  const isKnown = Number.isFinite(at);
+  const place = [path, member].filter((each) => each !== "").join(".");
+  return (
+    <tr role="row" class={outcome === "ok" ? undefined : "is-failed"} data-deed={deed.seq}>
+      <th role="rowheader" scope="row" title={isKnown ? new Date(at).toLocaleString(language) : undefined}>
+        {isKnown ? clockTime(at) : "–"}
+      </th>
+      <td role="cell" data-label={t("User")} title={client}>
+        {user || client || "–"}
+      </td>
+      <td role="cell" class="code" data-label={t("Event")}>
+        {event}
+      </td>
+      <td role="cell" data-label={t("Member")}>
+        {[device, place].filter((each) => each !== "").join(" · ")}
+      </td>
+      <td role="cell" data-label={t("State")}>
+        {detail === "" ? outcome : `${outcome}: ${detail}`}
+      </td>
+    </tr>
+  );
+}
