@@ -267,7 +267,7 @@ TEST_CASE("what waits for handlers that take too long is bounded in bytes, too")
   });
   echo.call("provoke");
   echo.connection().run_until([&] { return echo.connection().is_closed(); }, 20s);
-  CHECK(floods == 3);
+  CHECK(floods < 6);
   CHECK(failure.code != ErrorCode::none);
   CHECK_THAT(reason, Contains("bytes: they take too long") && Contains("67108864 bytes"));
 }
