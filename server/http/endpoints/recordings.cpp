@@ -113,21 +113,21 @@ std::string only_service(const Device& device) {
   return out;
 }
 
-using Answer = rr::awaitable<Response>;
+using RecordingsAnswer = rr::awaitable<Response>;
 
-rr::awaitable<void> send_made(std::function<Answer(const Request&)> make, ResponseWriter& writer) {
+rr::awaitable<void> send_made(std::function<RecordingsAnswer(const Request&)> make, ResponseWriter& writer) {
   const auto response = co_await make(writer.request());
   co_await writer.send(response);
 }
 
 /// A response that others do not wait for while it is made.
-Response make_later(std::function<Answer(const Request&)> make) {
+Response make_later(std::function<RecordingsAnswer(const Request&)> make) {
   Response out;
   out.answer_later = [make = std::move(make)](ResponseWriter& writer) { return send_made(make, writer); };
   return out;
 }
 
-Answer begin_recording(GatewayState& gateway, const Request& request) {
+RecordingsAnswer begin_recording(GatewayState& gateway, const Request& request) {
   const auto body = body_of(request);
   if (!body) co_return error_answer(body.error());
   auto wish = read_wish(*body);
@@ -166,7 +166,7 @@ Response answer_recorded(const AuditEntryPtr& entry, std::string_view name, cons
   return done ? std::move(response) : failure_answer(done.error());
 }
 
-Answer look_at_recording(GatewayState& gateway, const Request& request, std::string name) {
+RecordingsAnswer look_at_recording(GatewayState& gateway, const Request& request, std::string name) {
   const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
   if (!found) co_return refuse_finder(gateway, request, found.error());
   auto response = json_answer(200, described(*found));
@@ -174,7 +174,7 @@ Answer look_at_recording(GatewayState& gateway, const Request& request, std::str
   co_return response;
 }
 
-Answer stop_recording(GatewayState& gateway, const Request& request, std::string name) {
+RecordingsAnswer stop_recording(GatewayState& gateway, const Request& request, std::string name) {
   const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
   if (!found) co_return refuse_finder(gateway, request, found.error());
   const auto entry = begin_entry(gateway, request, *found, "recording_stopped");
@@ -183,7 +183,7 @@ Answer stop_recording(GatewayState& gateway, const Request& request, std::string
   co_return answer_recorded(entry, name, done, json_answer(200, described(now.value_or(*found))));
 }
 
-Answer delete_recording(GatewayState& gateway, const Request& request, std::string name) {
+RecordingsAnswer delete_recording(GatewayState& gateway, const Request& request, std::string name) {
   const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
   if (!found) co_return refuse_finder(gateway, request, found.error());
   const auto entry = begin_entry(gateway, request, *found, "recording_deleted");
@@ -193,7 +193,7 @@ Answer delete_recording(GatewayState& gateway, const Request& request, std::stri
   co_return answer_recorded(entry, name, done, std::move(response));
 }
 
-Answer list_recordings(GatewayState& gateway, const Request& request) {
+RecordingsAnswer list_recordings(GatewayState& gateway, const Request& request) {
   const auto& limits = gateway.config().recordings;
   Json out;
   out["enabled"] = !limits.folder.empty();
