@@ -76,7 +76,8 @@ struct Sessions : Loopback {
     while (take(*client, *service, requests) || take(*service, *client, answers)) {
     }
     while (const auto event = client->poll_event())
-      if (const auto* done = std::get_if<Completed>(&*event)) why_failed = done->result ? "" : done->result.error().message;
+      if (const auto* done = std::get_if<Completed>(&*event))
+        why_failed = done->result ? "" : done->result.error().message;
   }
 
   void find_finger() {
