@@ -174,10 +174,9 @@ RequestId ClientSession::get_attributes(Now now) {
 
 /// Asks for the next definition that is missing, one at a time, or goes on when there is none.
 void ClientSession::advance_fetch(Fetch fetch, Now now) {
-  if (fetch.bytes > max_fetched_bytes)
+  if (fetch.asked.size() > max_fetched_definitions || fetch.bytes > max_fetched_bytes)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
-                                        "the definitions have " + std::to_string(fetch.bytes) + " bytes, expected " +
-                                            std::to_string(max_fetched_bytes) + " at most"));
+                                        "the definitions import more than 1024 others, or have more than 8 MiB"));
   const auto missing = std::find_if(fetch.wanted.begin(), fetch.wanted.end(), [&](const std::string& name) {
     return !fetch.names.contains(name) && !types_.find_service(name);
   });
@@ -185,10 +184,6 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   if (!fetch.asked.insert(*missing).second)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
                                         "the node answered with another definition than " + quote(*missing)));
-  if (fetch.asked.size() > max_fetched_definitions)
-    return fail_fetch(
-        fetch, make_error(ErrorCode::service_definition_error,
-                          "the definitions import more than " + std::to_string(max_fetched_definitions) + " others"));
   const auto id = begin_request(EntryType::get_service_desc, options_.service, {});
   outgoing_.add_text("ServiceType", *missing);
   outgoing_.add_text("clientversion", protocol_level);
