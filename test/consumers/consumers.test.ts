@@ -98,7 +98,10 @@ async function show(out: string, script?: string, look = dumped): Promise<string
   }
 }
 
-/** What a page with a worker shows. Virtual time, which dumped() has, does not wait for workers: Chromium runs until it is told. */
+/**
+ * What a page shows that has a worker, or its core within. Virtual time, which dumped() has, waits for the network,
+ * but neither for workers nor for a core that is compiled: Chromium runs until it is told.
+ */
 async function told(url: string): Promise<string> {
   const flags = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"];
   const browser = spawn("chromium", [...flags, `--user-data-dir=${join(folder, "profile")}`, url], {
@@ -146,7 +149,7 @@ it("packs what a page needs, and installs without anything else", async () => {
 });
 
 it("is bundled by esbuild, with the core copied beside it", async () => {
-  await writeFile(join(folder, "inline.js"), page("rrgate-client/inline"));
+  await writeFile(join(folder, "inline.js"), page("rrgate-client/inline") + tell);
   await writeFile(
     join(folder, "vue.js"),
     `import { useDevice } from "rrgate-client/vue"; document.body.innerHTML = '<p id="shown">' + typeof useDevice + "</p>";`,
@@ -165,7 +168,7 @@ it("is bundled by esbuild, with the core copied beside it", async () => {
   expect(await show("esbuild", "page.js")).toBe(version);
   expect(await show("esbuild", "vue.js")).toBe("function");
   await rm(join(folder, "esbuild/rrgate.wasm"));
-  expect(await show("esbuild", "inline.js")).toBe(version);
+  expect(await show("esbuild", "inline.js", told)).toBe(version);
 }, 30_000);
 
 it("is bundled by esbuild, with worker and core copied beside it", async () => {
