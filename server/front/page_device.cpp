@@ -2,6 +2,7 @@
 
 #include "node/http/upgrade.hpp"
 #include "node/transport/websocket.hpp"
+#include "node/transport/wrapped_stream.hpp"
 #include "server/access/standing.hpp"
 #include "server/front/session_end.hpp"
 #include "server/json/json.hpp"
@@ -21,26 +22,13 @@ std::string_view name_of(const Request& request) {
 }
 
 /// The stream of one connection to a page. It is used by whoever has dialed, and can be closed from here.
-class LentStream final : public rr::ByteStream {
+class LentStream final : public rr::WrappedStream {
  public:
   LentStream(std::unique_ptr<rr::ByteStream> inner, std::function<void()> returned)
-      : inner_(std::move(inner)), returned_(std::move(returned)) {}
+      : WrappedStream(std::move(inner)), returned_(std::move(returned)) {}
   ~LentStream() override { returned_(); }
 
-  rr::awaitable<rr::ReadResult> read_some(std::span<std::uint8_t> into) override { return inner_->read_some(into); }
-  std::size_t try_write(std::span<const rr::ByteSpan> slices, rr::error_code& error) override {
-    return inner_->try_write(slices, error);
-  }
-  rr::awaitable<rr::error_code> write(std::span<const rr::ByteSpan> slices) override { return inner_->write(slices); }
-  void finish_sending() override { inner_->finish_sending(); }
-  void cancel() override { inner_->cancel(); }
-  rr::awaitable<void> end(const rr::EndReason& reason) override { return inner_->end(reason); }
-  void close() override { inner_->close(); }
-  std::string peer() const override { return inner_->peer(); }
-  boost::asio::any_io_executor executor() override { return inner_->executor(); }
-
  private:
-  std::unique_ptr<rr::ByteStream> inner_;
   std::function<void()> returned_;
 };
 

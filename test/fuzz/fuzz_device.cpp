@@ -13,6 +13,7 @@
 #include "node/service/memory.hpp"
 #include "node/service/node.hpp"
 #include "node/transport/socket_stream.hpp"
+#include "node/transport/wrapped_stream.hpp"
 #include "test/fuzz/inside_gateway.hpp"
 #include "test/fuzz/memory_bound.hpp"
 #include "test/fuzz/message_changes.hpp"
@@ -201,10 +202,10 @@ class Malice {
 };
 
 /// The gateway's end of a connection to the device, where messages of the device are changed.
-class BentStream final : public rr::ByteStream {
+class BentStream final : public rr::WrappedStream {
  public:
   BentStream(std::unique_ptr<rr::ByteStream> inner, std::shared_ptr<Malice> malice)
-      : inner_(std::move(inner)), malice_(std::move(malice)) {}
+      : WrappedStream(std::move(inner)), malice_(std::move(malice)) {}
 
   rr::awaitable<rr::ReadResult> read_some(std::span<std::uint8_t> into) override {
     while (changed_.empty() && !is_cut_) {
@@ -227,16 +228,7 @@ class BentStream final : public rr::ByteStream {
     changed_.erase(changed_.begin(), changed_.begin() + static_cast<std::ptrdiff_t>(count));
     co_return rr::ReadResult{{}, count};
   }
-  std::size_t try_write(std::span<const rr::ByteSpan> slices, rr::error_code& error) override {
-    return inner_->try_write(slices, error);
-  }
-  rr::awaitable<rr::error_code> write(std::span<const rr::ByteSpan> slices) override { return inner_->write(slices); }
-  void finish_sending() override { inner_->finish_sending(); }
-  void cancel() override { inner_->cancel(); }
-  rr::awaitable<void> end(const rr::EndReason& reason) override { return inner_->end(reason); }
-  void close() override { inner_->close(); }
   std::string peer() const override { return "the device"; }
-  boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
  private:
   void bend(rr::ByteSpan message) {
@@ -248,7 +240,6 @@ class BentStream final : public rr::ByteStream {
     changed_.insert(changed_.end(), instead->begin(), instead->end());
   }
 
-  std::unique_ptr<rr::ByteStream> inner_;
   std::shared_ptr<Malice> malice_;
   rr::FrameScanner scanner_;
   rr::Bytes changed_;

@@ -9,6 +9,12 @@ using namespace rr::test;
 
 namespace {
 
+struct Anybody final : Authenticator {
+  Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
+    return AuthenticatedUser{attempt.username};
+  }
+};
+
 class Remote : public Loopback {
  public:
   Remote() {
@@ -20,6 +26,17 @@ class Remote : public Loopback {
   Result<> send(const MemberDefinition& wire, const WireValue& value) {
     WirePacket packet("arm", wire, value.value, value.time, now.steady);
     return service->send_wire(packet, now);
+  }
+  /// As alice, where the policy lets anybody in.
+  void log_in(SecurityPolicy policy) {
+    policy.authenticator = std::make_shared<Anybody>();
+    hosted().set_policy(policy);
+    const auto login = client->authenticate("alice", Value(MapString{}), now);
+    pump();
+    service->answer_login(next_service<LoginRequested>().id, AuthenticatedUser{"alice"}, now);
+    next_service<UserChanged>();
+    CHECK(service->user()->name == "alice");
+    REQUIRE(completion(login));
   }
   void find(const std::string& path) {
     hosted().add_object(path, std::make_shared<PlainObject>("experimental.loopback.Tool")).value();
@@ -302,21 +319,8 @@ TEST_CASE("what a client of a remote service sends behind its disconnect is left
 }
 
 TEST_CASE("a remote service hears that its client is another user") {
-  struct Anybody final : Authenticator {
-    Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
-      return AuthenticatedUser{attempt.username};
-    }
-  };
   Remote pair;
-  SecurityPolicy policy;
-  policy.authenticator = std::make_shared<Anybody>();
-  pair.hosted().set_policy(policy);
-  const auto login = pair.client->authenticate("alice", Value(MapString{}), pair.now);
-  pair.pump();
-  pair.service->answer_login(pair.next_service<LoginRequested>().id, AuthenticatedUser{"alice"}, pair.now);
-  pair.next_service<UserChanged>();
-  CHECK(pair.service->user()->name == "alice");
-  CHECK(pair.completion(login));
+  pair.log_in(SecurityPolicy());
   const auto logout = pair.client->logout(pair.now);
   pair.pump();
   pair.next_service<UserChanged>();
@@ -505,21 +509,10 @@ TEST_CASE("an object that is gone again when it was found is not looked for with
 }
 
 TEST_CASE("connects that wait for an answer get one when their object is replaced, or their user logs out") {
-  struct Anybody final : Authenticator {
-    Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
-      return AuthenticatedUser{attempt.username};
-    }
-  };
   Remote pair;
   SecurityPolicy policy;
-  policy.authenticator = std::make_shared<Anybody>();
   policy.require_valid_user = true;
-  pair.hosted().set_policy(policy);
-  const auto login = pair.client->authenticate("alice", Value(MapString{}), pair.now);
-  pair.pump();
-  pair.service->answer_login(pair.next_service<LoginRequested>().id, AuthenticatedUser{"alice"}, pair.now);
-  pair.next_service<UserChanged>();
-  REQUIRE(pair.completion(login));
+  pair.log_in(policy);
   const auto wire = pair.client->connect_wire("arm", "torque", pair.now);
   const auto pipe = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
   pair.pump();

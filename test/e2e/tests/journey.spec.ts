@@ -6,6 +6,7 @@ import { startNginx } from "../nginx";
 import type { Nginx } from "../nginx";
 import { webRoot } from "../processes";
 import { button, field, link } from "../visitor";
+import type { Visitor } from "../visitor";
 
 const phone = [412, 839] as const;
 
@@ -23,14 +24,29 @@ test.beforeAll(async () => {
 
 test.afterAll(() => Promise.all([nginx?.stop(), lab?.stop()]));
 
+async function signIn(visitor: Visitor): Promise<void> {
+  await visitor.write(field("Name"), "root");
+  await visitor.write(field("Password or token"), password);
+  await visitor.press(button("Sign in"));
+}
+
+/** The board as it is kept, by its address alone. */
+async function openOnPhone(visitor: Visitor): Promise<void> {
+  await visitor.see({ css: '[data-kept="true"]' });
+  const address = await visitor.run(() => location.href);
+  expect(address).toContain("&board=");
+  expect(await visitor.complaints()).toEqual([]);
+  await visitor.open("about:blank");
+  await visitor.resize(...phone);
+  await visitor.open(address);
+}
+
 inEachEngine((at) => {
   test("with only the URL: signs in, jogs joint 3, watches camera and plot, keeps the board, opens it on a phone", async () => {
     const visitor = at();
     test.slow(); // the whole way of a person, in a browser that may be slow
     await visitor.open(lab.url);
-    await visitor.write(field("Name"), "root");
-    await visitor.write(field("Password or token"), password);
-    await visitor.press(button("Sign in"));
+    await signIn(visitor);
     await visitor.press({ css: '[data-device="baxter"] a.service[href$="left_arm"]' });
 
     await visitor.see({ css: '[data-link="online"]' });
@@ -51,14 +67,7 @@ inEachEngine((at) => {
     await visitor.press(button("Done"));
     const picture = '[data-panel="image"] canvas';
     await expect.poll(() => visitor.run(coloursOf, picture)).toBeGreaterThan(3);
-    await visitor.see({ css: '[data-kept="true"]' });
-    const address = await visitor.run(() => location.href);
-    expect(address).toContain("&board=");
-    expect(await visitor.complaints()).toEqual([]);
-
-    await visitor.open("about:blank");
-    await visitor.resize(...phone);
-    await visitor.open(address);
+    await openOnPhone(visitor);
     await visitor.see(third, new RegExp(`^${jogged}$`));
     await visitor.see({ css: '[data-panel="plot"] .freshness' }, /a second/);
     await expect.poll(() => visitor.run(coloursOf, picture)).toBeGreaterThan(3);
@@ -75,9 +84,7 @@ inEachEngine((at) => {
   test("signs in, drives, looks at camera and plot, makes a board, and opens it on a phone", async () => {
     const visitor = at();
     await visitor.open(lab.url);
-    await visitor.write(field("Name"), "root");
-    await visitor.write(field("Password or token"), password);
-    await visitor.press(button("Sign in"));
+    await signIn(visitor);
     await visitor.press({ css: '[data-device="create"] a.service' });
 
     await visitor.see({ css: '[data-link="online"]' });
@@ -96,14 +103,7 @@ inEachEngine((at) => {
     await visitor.press(button("Add panel"));
     await visitor.write({ css: '[data-panel="notes"] textarea' }, "call Vera");
     await visitor.press(button("Done"));
-    await visitor.see({ css: '[data-kept="true"]' });
-    const address = await visitor.run(() => location.href);
-    expect(address).toContain("&board=");
-    expect(await visitor.complaints()).toEqual([]);
-
-    await visitor.open("about:blank");
-    await visitor.resize(...phone);
-    await visitor.open(address);
+    await openOnPhone(visitor);
     await visitor.see({ css: '[data-panel="plot"] .freshness' }, /a second/);
     const note = () => visitor.run(() => document.querySelector<HTMLTextAreaElement>(".board textarea")?.value);
     await expect.poll(note).toBe("call Vera");

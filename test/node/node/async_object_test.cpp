@@ -281,6 +281,14 @@ struct SlowArm {
   }
 };
 
+AsyncObject connect_arm(asio::io_context& io, const RunningNode& node) {
+  AsyncObject arm;
+  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
+  while (!arm.connection() && io.run_one() != 0) {
+  }
+  return arm;
+}
+
 }  // namespace
 
 TEST_CASE("a request beside a timer ends with the timer, and its answer is dropped when it comes") {
@@ -315,10 +323,7 @@ TEST_CASE("a request that is cancelled fails so; cancelling what has ended does 
   asio::io_context io;
   asio::cancellation_signal signal;
   std::vector<ErrorCode> codes;
-  AsyncObject arm;
-  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
-  while (!arm.connection() && io.run_one() != 0) {
-  }
+  const auto arm = connect_arm(io, node);
   const auto note = [&](const std::exception_ptr& failure, const Value&) {
     codes.push_back(failure ? error_of([&] { std::rethrow_exception(failure); }).code : ErrorCode::none);
   };
@@ -346,10 +351,7 @@ TEST_CASE("what a cancelled request began with the service is ended") {
   SlowArm slow;
   RunningNode node([&](Node& made) { slow.add_to(made); });
   asio::io_context io;
-  AsyncObject arm;
-  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
-  while (!arm.connection() && io.run_one() != 0) {
-  }
+  const auto arm = connect_arm(io, node);
   asio::cancellation_signal wire, pipe, generator;
   int cancelled = 0;
   int received = 0;
@@ -403,10 +405,7 @@ TEST_CASE("a wire that is connected again stays so when the answer to a cancelle
   SlowArm slow;
   RunningNode node([&](Node& made) { slow.add_to(made); });
   asio::io_context io;
-  AsyncObject arm;
-  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
-  while (!arm.connection() && io.run_one() != 0) {
-  }
+  const auto arm = connect_arm(io, node);
   asio::cancellation_signal first;
   bool is_cancelled = false;
   int received_by_first = 0;

@@ -7,19 +7,15 @@ import { useNow, useStore } from "../app/store";
 import { AgentSessionList, sessionsOf } from "../gateway/agent_sessions";
 import type { AgentCommand, AgentSession, AgentSessionsState } from "../gateway/agent_sessions";
 import type { AgentsDesk } from "../gateway/agents";
+import { Folded } from "../ui/folded";
 import { clockTime, sentence, span } from "../ui/words";
 
 export function AgentSessionsPart({ agents }: { agents: AgentsDesk }) {
-  return useStore(agents.state) && <Part />;
-}
-
-function Part() {
-  const [open, setOpen] = useState(false);
+  if (!useStore(agents.state)) return null;
   return (
-    <details class="subscriptions agent-sessions" onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary>{t("What agents do")}</summary>
-      {open && <Sessions />}
-    </details>
+    <Folded name="agent-sessions" summary={t("What agents do")}>
+      <Sessions />
+    </Folded>
   );
 }
 

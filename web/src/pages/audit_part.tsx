@@ -7,20 +7,16 @@ import { useStore } from "../app/store";
 import { askDeeds } from "../gateway/audit";
 import type { Deed, Deeds } from "../gateway/audit";
 import { session } from "../gateway/session";
+import { Folded } from "../ui/folded";
 import { useAsked } from "../ui/use_asked";
 import { clockTime, sentence } from "../ui/words";
 
 export function AuditPart() {
-  return useStore(session.who)?.admin ? <Part /> : null;
-}
-
-function Part() {
-  const [open, setOpen] = useState(false);
+  if (!useStore(session.who)?.admin) return null;
   return (
-    <details class="subscriptions audit-part" onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary>{t("What users did")}</summary>
-      {open && <Search />}
-    </details>
+    <Folded name="audit-part" summary={t("What users did")}>
+      <Search />
+    </Folded>
   );
 }
 
@@ -38,24 +34,8 @@ function Search() {
           setAsked({ user: user.trim(), device: device.trim(), turn: asked.turn + 1 });
         }}
       >
-        <label>
-          {t("User")}{" "}
-          <input
-            type="text"
-            autocapitalize="none"
-            value={user}
-            onInput={(event) => setUser(event.currentTarget.value)}
-          />
-        </label>
-        <label>
-          {t("Device")}{" "}
-          <input
-            type="text"
-            autocapitalize="none"
-            value={device}
-            onInput={(event) => setDevice(event.currentTarget.value)}
-          />
-        </label>
+        <Pattern label={t("User")} value={user} set={setUser} />
+        <Pattern label={t("Device")} value={device} set={setDevice} />
         <button class="button" type="submit">
           {t("Show")}
         </button>
@@ -65,6 +45,15 @@ function Search() {
       </p>
       {answer && answer.list.length > 0 && <DeedTable deeds={answer.list} />}
     </>
+  );
+}
+
+function Pattern({ label, value, set }: { label: string; value: string; set: (value: string) => void }) {
+  return (
+    <label>
+      {label}{" "}
+      <input type="text" autocapitalize="none" value={value} onInput={(event) => set(event.currentTarget.value)} />
+    </label>
   );
 }
 

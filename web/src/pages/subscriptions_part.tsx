@@ -6,6 +6,7 @@ import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
 import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
+import { Folded } from "../ui/folded";
 import { ageText, clockTime, sentence } from "../ui/words";
 
 interface Props {
@@ -15,15 +16,16 @@ interface Props {
 }
 
 export function SubscriptionsPart({ device, online, stale }: Props) {
-  const [open, setOpen] = useState(false);
+  const summary = (
+    <>
+      {t("Subscriptions")}
+      <span class="unseen"> {device}</span>
+    </>
+  );
   return (
-    <details class="subscriptions" onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary>
-        {t("Subscriptions")}
-        <span class="unseen"> {device}</span>
-      </summary>
-      {open && <Subscriptions device={device} online={online} stale={stale} />}
-    </details>
+    <Folded summary={summary}>
+      <Subscriptions device={device} online={online} stale={stale} />
+    </Folded>
   );
 }
 
