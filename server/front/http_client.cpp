@@ -307,12 +307,14 @@ bool makes_work(const Request& request) {
 
 /// Who goes through with a request though it be too much; empty: nobody.
 std::function<bool(const Identity&)> who_passes(GatewayState& gateway, const Request& request) {
-  const auto& rules = gateway.access().state().rules;
-  if (may_stop_something(request)) return [&rules](const Identity& who) { return rules.sees_any(who); };
+  // The rules are asked when it is known who comes: they may have been read anew by then.
+  if (may_stop_something(request))
+    return [&gateway](const Identity& who) { return gateway.access().state().rules.sees_any(who); };
   auto urgent = find_urgent(gateway, request);
   if (!urgent) return {};
-  return [&rules, urgent = std::move(*urgent)](const Identity& who) {
-    return rules.check(who, {.device = urgent.device, .service = urgent.service, .verb = urgent.verb}).has_value();
+  return [&gateway, urgent = std::move(*urgent)](const Identity& who) {
+    const AccessRequest wanted{.device = urgent.device, .service = urgent.service, .verb = urgent.verb};
+    return gateway.access().state().rules.check(who, wanted).has_value();
   };
 }
 
