@@ -72,8 +72,8 @@ class Shell:
                 ready = json.loads(said)
             except ValueError:
                 return  # no gateway, or one that speaks TLS
-            if ready["devices"] == ready["devices_online"]:
-                return
+            if "devices" not in ready or ready["devices"] == ready["devices_online"]:
+                return  # a node that listens by HTTP has no such counts
             time.sleep(0.05)
 
     def _ask(self, command):
