@@ -147,7 +147,6 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
   has_asked_device_ = false;  // from here on these are the gateway's words, until the device is asked
   const auto& target = *command.target;
   allow(target, verb);
-  if (on_permitted_) on_permitted_();
   const auto& member = commanded_member(target, verb);
   const rr::JsonForm form;
   if (const auto* most = arguments->find("most")) command.most = count_of(*most, "most", most_results);
@@ -368,7 +367,6 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
 McpTools::Answer McpTools::stop(JsonRequestPtr arguments) {
   const auto target = co_await find(arguments, true);
   has_asked_device_ = false;
-  if (on_permitted_) on_permitted_();
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
   const auto entry = gateway_.access().begin(who(), access_request(*target, Verb::call), trace, "stop");
   const auto stopped = target->client->upstream()->stop_object(target->path());

@@ -193,7 +193,7 @@ std::string shown(const rr::Json& arguments, const char* key) {
   return bounded_text(found->is_string() ? found->get<std::string>() : rr::write_json(*found), longest_shown);
 }
 
-/// A command in that list, until this ends.
+/// A command in that list, from when it is asked for until this ends: also one that is refused, for people to see.
 class ShownCommand {
  public:
   ShownCommand(AgentSession& agent, const std::string& tool, const rr::Json& arguments)
@@ -379,9 +379,9 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     const auto found = message.params.find("arguments");
     const auto arguments = found == message.params.end() ? rr::Json::object() : *found;
     if (!arguments.is_object()) throw McpRefusal{invalid_params, "\"arguments\" is no object"};
-    std::optional<ShownCommand> command;  // none is shown of whoever may give none
+    std::optional<ShownCommand> command;
     if (McpTools::is_command(name))
-      tools.on_permitted([&] { command.emplace(agent, name, arguments); });
+      command.emplace(agent, name, arguments);
     else
       ++agent.reads;
     auto result = co_await tools.call(name, arguments);

@@ -28,8 +28,6 @@ class McpTools {
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
 
-  /// Called once a command is found and its asker may give it, on whatever terms.
-  void on_permitted(std::function<void()> handler) { on_permitted_ = std::move(handler); }
 
   /// The image that stands beside the answer; null: there is none.
   const McpImage* image() const { return image_ ? &*image_ : nullptr; }
@@ -132,7 +130,6 @@ class McpTools {
   Standing standing_;
   std::optional<RateGate::Pass> pass_;
   std::optional<McpImage> image_;
-  std::function<void()> on_permitted_;
   bool has_asked_device_ = false;  ///< errors from then on may be in the device's words
 };
 

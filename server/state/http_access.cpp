@@ -192,14 +192,14 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
     co_return out;
   }
   request.identity = std::move(*identity);
-  if (request.identity.is_proven() && !request.identity.sign_in.empty())
-    if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
-      out.cookie = format_sign_in_cookie(request.arrival, *next);
-  if (request.identity.is_proven())
+  if (request.identity.is_proven()) {
+    if (!request.identity.sign_in.empty())
+      if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
+        out.cookie = format_sign_in_cookie(request.arrival, *next);
     out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                             std::chrono::steady_clock::now());
-  if (request.identity.is_proven() && !out.user && request.too_much.empty())
-    request.too_much = "of " + rr::quote(request.identity.name);
+    if (!out.user && request.too_much.empty()) request.too_much = "of " + rr::quote(request.identity.name);
+  }
   if (!request.too_much.empty() && !(passes && passes(request.identity)))
     out.refusal = refuse_too_much(request.identity, nullptr, request.too_much);
   co_return out;

@@ -294,13 +294,14 @@ def test_a_person_sees_which_agents_have_been_here_and_what_they_have_commanded(
     assert (dry["state"], dry["detail"]) == ("done", "dry run: nothing was sent")
 
 
-def test_commands_of_an_agent_that_may_give_none_are_not_shown(lab):
+def test_commands_that_an_agent_may_not_give_are_shown_as_refused(lab):
     made = lab({**rule(approval="none"), "members": ["other"]})
     assert made.set(1).is_error
     call(made.port, "read", made.agent, device="interop", path="plain/speed")
     sessions = ask(made.port, "GET", SESSIONS, headers=made.admin).json["sessions"]
     assert sum(each["reads"] for each in sessions) == 1
-    assert all(each["commands"] == 0 and each["last_commands"] == [] for each in sessions)
+    commands = [command for each in sessions for command in each["last_commands"]]
+    assert [(command["path"], command["state"]) for command in commands] == [("plain/speed", "failed")]
 
 
 def test_agents_write_to_nothing_but_properties_and_call_no_generators(lab):
