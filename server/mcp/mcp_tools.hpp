@@ -28,7 +28,6 @@ class McpTools {
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
 
-
   /// The image that stands beside the answer; null: there is none.
   const McpImage* image() const { return image_ ? &*image_ : nullptr; }
 

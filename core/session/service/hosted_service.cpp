@@ -117,8 +117,8 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path, R
     // One that is not remembered would be another object for each who asks: none of them would hear of the others'.
     if (objects_.size() >= max_cached_objects && !make_room(prefix))
       return make_error(ErrorCode::out_of_system_resource,
-                        "object " + quote(prefix) + ": clients of the service use " + std::to_string(objects_.size()) +
-                            " paths of objects already, expected at most " + std::to_string(max_cached_objects));
+                        "object " + quote(prefix) + ": clients use too many paths of objects, expected at most " +
+                            std::to_string(max_cached_objects));
     remember(std::string(prefix), found);
   }
   return found;

@@ -147,12 +147,17 @@ ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
 
 /// Those that wait for an answer get `why`; the others' clients know by other means.
 void ServiceSession::release_wires(std::string_view path, const Error& why, Now now) {
-  std::vector<std::pair<std::string, const MemberDefinition*>> waiting;
-  for (const auto& [key, wire] : wires_)
-    if (wire.state == WireState::connecting && is_within(key.path, path)) waiting.emplace_back(key.path, wire.member);
-  for (const auto& [of, member] : waiting) answer_wire(of, *member, why, now);
-  for (auto wire = wires_.begin(); wire != wires_.end();)
-    wire = is_within(wire->first.path, path) ? end_wire(wire) : std::next(wire);
+  for (auto wire = wires_.begin(); wire != wires_.end();) {
+    if (!is_within(wire->first.path, path)) {
+      ++wire;
+    } else if (wire->second.state == WireState::connecting) {
+      const auto key = wire->first;
+      answer_wire(key.path, *wire->second.member, why, now);
+      wire = wires_.upper_bound(key);  // what could not be sent has ended the session, and all that it had
+    } else {
+      wire = end_wire(wire);
+    }
+  }
 }
 
 void ServiceSession::end_all_wires() {
