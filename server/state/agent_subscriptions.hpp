@@ -32,7 +32,7 @@ class AgentSubscriptions {
  public:
   static constexpr std::size_t most_resources = 64;  ///< of a session
   static constexpr std::size_t most_sessions = 256;
-  static constexpr std::size_t most_of_owner = 32;  ///< sessions: the others get theirs
+  static constexpr std::size_t most_of_owner = 128;  ///< sessions, half of all: the others get theirs
 
   /// `owner`  whose the session is: a user, or the network of somebody whom nobody knows.
   /// Errors   out_of_system_resource: it has as many as it may have, or there are too many sessions with streams.
