@@ -1,5 +1,4 @@
 """Fixtures of the interoperability tests: one pair of service and route at a time, shared by its scenarios."""
-import faulthandler
 import json
 import os
 import shutil
@@ -16,9 +15,6 @@ from gateways import RRGATE
 from matrix import Matrix
 from processes import ROOT, Background, free_port, start_gateway
 from tls_nodes import make_lab
-
-TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
-
 
 matrix = Matrix()
 
@@ -64,17 +60,6 @@ def node():
     setup = RR.ClientNodeSetup(argv=["test", *(f"--robotraconteur-{name}={value}" for name, value in quiet_node.QUIET.items())])
     yield RR.RobotRaconteurNode.s
     setup.close()
-
-
-@pytest.fixture(autouse=True)
-def deadline():
-    """A test that does the same thing many times calls it for each of them."""
-    def begin():
-        faulthandler.dump_traceback_later(TEST_DEADLINE, exit=True)
-
-    begin()
-    yield begin
-    faulthandler.cancel_dump_traceback_later()
 
 
 def pytest_generate_tests(metafunc):
