@@ -1,6 +1,8 @@
 """What holds for all tests in Python."""
 import faulthandler
+import os
 import signal
+import sys
 
 import pytest
 
@@ -32,7 +34,7 @@ def pytest_runtest_makereport(item, call):
 
 def begin():
     signal.setitimer(signal.ITIMER_REAL, DEADLINE)
-    faulthandler.dump_traceback_later(LAST_DEADLINE, exit=True)
+    faulthandler.dump_traceback_later(LAST_DEADLINE, exit=True, file=stderr)
 
 
 def end():
@@ -45,6 +47,8 @@ def give_up(number, frame):
 
 
 def pytest_configure():
+    global stderr
+    stderr = os.dup(sys.__stderr__.fileno())  # that of tests is captured, and lost where the run ends
     signal.signal(signal.SIGALRM, give_up)
 
 

@@ -1,8 +1,7 @@
 // Packing of numbers, strings, arrays and containers; named types are in pack_named.cpp.
 #include "core/types/pack.hpp"
 
-#include <algorithm>
-
+#include "core/support/sort.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/number.hpp"
 #include "core/types/packer.hpp"
@@ -204,7 +203,7 @@ bool Packer::pack_map(const FieldPath& path, const Value& value, DataType type, 
   }
   std::vector<const Item*> sorted;
   for (const auto& item : map->items) sorted.push_back(&item);
-  std::sort(sorted.begin(), sorted.end(), KeyBefore());
+  rr::sort(sorted, KeyBefore());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const auto& [key, item] = *sorted[i];
     if (i > 0 && sorted[i - 1]->first == key)

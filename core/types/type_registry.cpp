@@ -1,7 +1,7 @@
 #include "core/types/type_registry.hpp"
 
 #include <algorithm>
-#include <unordered_set>
+#include <set>
 
 #include "core/robdef/model/names.hpp"
 
@@ -113,7 +113,7 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
 
 std::vector<const ServiceDefinition*> TypeRegistry::known_imports(const Definitions& importers) const {
   std::vector<const ServiceDefinition*> known;
-  std::unordered_set<std::string_view> seen;
+  std::set<std::string_view> seen;
   const auto add_from = [&](const ServiceDefinition& importer) {
     for (const auto& import : importer.imports)
       if (const auto* found = find_service(import.name); found && seen.insert(found->name).second)

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -34,17 +34,11 @@ class TypeRegistry {
   const std::vector<Diagnostic>& warnings() const { return warnings_; }
 
  private:
-  /// Hashes text of any kind, so that look-ups need no std::string.
-  struct TextHash {
-    using is_transparent = void;
-    std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-  };
-
   /// What is there already and `importers` import, imports of imports included.
   std::vector<const ServiceDefinition*> known_imports(const Definitions& importers) const;
 
   template <class Definition>
-  using Index = std::unordered_map<std::string, const Definition*, TextHash, std::equal_to<>>;
+  using Index = std::map<std::string, const Definition*, std::less<>>;
 
   Definitions definitions_;
   Index<ServiceDefinition> services_;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "core/support/sort.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/pack.hpp"
 #include "core/types/unpacker.hpp"
@@ -221,8 +222,7 @@ bool Unpacker::unpack_map(const FieldPath& path, const MessageElement& element, 
     if (!read_key(path, child, key) || !unpack_one(step_to(path, key), child, value)) return false;
   }
   using Item = typename decltype(map.items)::value_type;
-  if (!std::is_sorted(map.items.begin(), map.items.end(), ItemBefore()))
-    std::sort(map.items.begin(), map.items.end(), ItemBefore());
+  if (!std::is_sorted(map.items.begin(), map.items.end(), ItemBefore())) rr::sort(map.items, ItemBefore());
   const auto twice = std::adjacent_find(map.items.begin(), map.items.end(),
                                         [](const Item& a, const Item& b) { return a.first == b.first; });
   if (twice != map.items.end())

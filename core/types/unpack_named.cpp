@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "core/support/sort.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/unpacker.hpp"
 
@@ -35,7 +36,7 @@ class FieldFinder {
     for (const auto& child : children_)
       if (child.key_kind == KeyKind::name) index_.push_back(&child);
     // Equal names stay in wire order, which is address order: a stable_sort is three times the code.
-    std::sort(index_.begin(), index_.end(), [](const MessageElement* a, const MessageElement* b) {
+    rr::sort(index_, [](const MessageElement* a, const MessageElement* b) {
       return a->name != b->name ? a->name < b->name : std::less<>()(a, b);
     });
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/support/sort.hpp"
 #include "core/types/number.hpp"
 
 namespace rr {
@@ -18,7 +19,7 @@ bool is_same_map(const Map& left, const Map& right) {
     std::vector<const Item*> items;
     items.reserve(map.items.size());
     for (const auto& item : map.items) items.push_back(&item);
-    std::sort(items.begin(), items.end(), [](const Item* a, const Item* b) { return a->first < b->first; });
+    rr::sort(items, [](const Item* a, const Item* b) { return a->first < b->first; });
     return items;
   };
   const auto left_items = sorted(left);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/support/sort.hpp"
 #include "core/wire/variable_int.hpp"
 
 namespace rr {
@@ -94,7 +95,7 @@ std::optional<std::uint32_t> standard_code(std::string_view text) {
 void LocalTexts::sort() {
   // Equal codes stay in wire order, which is address order: no stable_sort, it would allocate. An empty text has the
   // address behind its length byte like any other.
-  std::sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) {
+  rr::sort(rows_, [](const Row& a, const Row& b) {
     return a.code != b.code ? a.code < b.code : a.text.data() < b.text.data();
   });
 }

@@ -271,9 +271,9 @@ AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& opera
 }
 
 rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {
-  if (own_) {
-    if (const auto opened = co_await own_->upstream()->opened(); !opened) throw rr::Exception(opened.error());
-    co_return own_;
+  if (const auto own = own_) {  // which may leave while this waits
+    if (const auto opened = co_await own->upstream()->opened(); !opened) throw rr::Exception(opened.error());
+    co_return own;
   }
   auto key = place_.key;
   auto from = place_.from;

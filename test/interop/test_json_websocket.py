@@ -169,6 +169,25 @@ def test_an_id_that_is_used_again_names_what_was_opened_last(node, tmp_path):
         site.stop()
 
 
+def test_a_page_that_leaves_while_its_device_is_connected_again(node, tmp_path):
+    site = Site(tmp_path, node, start_device=start_service)
+    try:
+        with Socket(site.port) as page:
+            page.open("subscribe", "doubled")
+            site.device.pause()
+            before = len(site.line.streams)
+            site.line.cut()
+            page.next(state="connection_lost")
+            page.send("get", "version")
+            wait_until(lambda: any(site.line.streams[before:]))  # what the gateway says to the device
+        wait_until(lambda: "client disconnected" in (tmp_path / "gateway.log").read_text())
+        site.device.resume()
+        with Socket(site.port) as page:
+            assert page.ask("get", "version") == "1"
+    finally:
+        site.stop()
+
+
 def test_more_packets_than_wait_at_a_time_arrive_in_order(page):
     doubled = page.open("subscribe", "doubled")
     count = 3000

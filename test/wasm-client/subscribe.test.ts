@@ -1,6 +1,7 @@
 // Subscriptions: connections come and go, the waits between are in the hands of the test.
 import { ErrorCode, findServices, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/node.js";
+import { Core } from "../../wasm-client/dist/internal.js";
 import { failure, settle, subscribe, TestService } from "./service.js";
 
 const definition = `service test.subscribe
@@ -142,6 +143,23 @@ it("is not sent again what it knows of the service, unless that has changed", as
   expect(changed).toBeGreaterThan(full);
   expect(knownToo).toBe(known);
   expect(types).toEqual([[definition], [definition], [definition], [withForce], [withForce]]);
+  await subscription.close();
+});
+
+it("asks nothing of a core that has failed, and connects again", async () => {
+  const begin = () => TestService.start({ definitions: [definition], root: "test.subscribe.Root" });
+  const subscription = follow(inTurn(await begin(), await begin()));
+  const client = await subscription.client();
+  const asked = vi.spyOn(Core.prototype, "knownDefinitions");
+  vi.spyOn(Core.prototype, "handleBytes").mockImplementationOnce(() => {
+    throw new WebAssembly.RuntimeError("Out of bounds memory access");
+  });
+  const error = await failure(client["twice"]!(1));
+  expect(error.message).toBe("the session failed: Out of bounds memory access");
+  clock.fire();
+  expect(await (await subscription.client())["twice"]!(2)).toBe(2);
+  expect(asked).not.toHaveBeenCalled();
+  vi.restoreAllMocks();
   await subscription.close();
 });
 

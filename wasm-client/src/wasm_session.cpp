@@ -356,7 +356,8 @@ JsValue WasmSession::definitions() const {
 
 JsValue WasmSession::known_definitions() const {
   const JsValue known = make_js_array();
-  for (const auto& each : session_.known_definitions().value_or(std::vector<KnownDefinitions>())) {
+  if (!session_.known_definitions()) return known;
+  for (const auto& each : *session_.known_definitions()) {
     const JsValue item = make_js_array();
     push_js(item, make_js_text(each.name));
     push_js(item, make_js_text(each.tag));

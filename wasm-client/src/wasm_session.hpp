@@ -3,7 +3,7 @@
 #pragma once
 
 #include <optional>
-#include <unordered_set>
+#include <set>
 
 #include "core/session/client/client_session.hpp"
 #include "wasm-client/src/js_access.hpp"
@@ -128,7 +128,7 @@ class WasmSession {
   ClientSession session_;
   std::optional<Error> error_;  ///< of the last request
   Bytes received_;
-  std::unordered_set<RequestId> varvalue_replies_;  ///< requests whose value brings its type along
+  std::set<RequestId> varvalue_replies_;  ///< requests whose value brings its type along
 };
 
 }  // namespace rr

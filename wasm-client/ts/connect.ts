@@ -119,7 +119,7 @@ export async function connectWith<T>(
       }),
     );
     const session = attempt.begin(core, requestTimeout);
-    if (memory) session.onClose(() => (memory.known = core.knownDefinitions()));
+    if (memory) session.onClose(() => !session.isBroken && (memory.known = core.knownDefinitions()));
     const type = await attempt.unlessFailed(session.start());
     return new ObjectTree(session).root(service, type) as Client<T>;
   } catch (error) {

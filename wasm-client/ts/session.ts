@@ -36,6 +36,7 @@ export type CallbackHandler = (...args: RrValue[]) => unknown;
 
 export class Session {
   /** Set by close(), or by whatever ended the session. */
+  #isBroken = false;
   #end: { reason: RobotRaconteurError; isLocal: boolean } | undefined;
   #wasConnected = false;
   #isClosed = false;
@@ -206,6 +207,11 @@ export class Session {
 
   // --- the end ---
 
+  /** The core has failed in the middle of something: what it would say of itself means nothing any more. */
+  get isBroken(): boolean {
+    return this.#isBroken;
+  }
+
   /** Takes leave of the service; what waits for an answer rejects at once. */
   close(): Promise<void> {
     if (!this.#end) {
@@ -366,6 +372,7 @@ export class Session {
     try {
       what();
     } catch (error) {
+      this.#isBroken = true;
       this.#finish(makeError("InternalError", `the session failed: ${textOf(error)}`));
     }
   }

@@ -2,9 +2,9 @@
 // Source: service definitions spec section 5.9.
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 
 #include "core/robdef/model/service_definition.hpp"
 
@@ -21,8 +21,8 @@ class CanonicalNames {
 
  private:
   std::string_view service_;
-  std::unordered_map<std::string_view, std::string_view> targets_ = {};      ///< alias -> qualified name
-  std::unordered_map<std::string_view, std::string_view> first_alias_ = {};  ///< qualified name -> alias
+  std::map<std::string_view, std::string_view> targets_ = {};      ///< alias -> qualified name
+  std::map<std::string_view, std::string_view> first_alias_ = {};  ///< qualified name -> alias
 };
 
 /// Whether options stand before the version: the one order that existing peers read at stdver 0.9.2 and up.

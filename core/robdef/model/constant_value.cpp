@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <limits>
-#include <unordered_set>
+#include <set>
 #include <utility>
 
 #include "core/robdef/model/names.hpp"
@@ -278,7 +278,7 @@ bool ValueReader::read_escape(std::string& out) {
 }
 
 bool ValueReader::read_structure(std::vector<ConstantField>& out) {
-  std::unordered_set<std::string_view> names;
+  std::set<std::string_view> names;
   if (!accept('{')) return fail_here("'{' and the fields of the struct");
   skip_blanks();
   if (accept('}')) return true;

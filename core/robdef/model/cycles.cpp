@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/support/sort.hpp"
+
 namespace rr {
 
 namespace {
@@ -85,8 +87,8 @@ std::vector<std::vector<std::size_t>> find_cycles(const Graph& graph) {
     return component.size() == 1 && std::find(edges.begin(), edges.end(), component.front()) == edges.end();
   };
   components.erase(std::remove_if(components.begin(), components.end(), is_no_cycle), components.end());
-  for (auto& component : components) std::sort(component.begin(), component.end());
-  std::sort(components.begin(), components.end());
+  for (auto& component : components) rr::sort(component);
+  rr::sort(components);
   return components;
 }
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <string_view>
-#include <unordered_map>
 
 #include "core/robdef/model/cycles.hpp"
 #include "core/robdef/model/names.hpp"
@@ -46,7 +46,7 @@ class Resolver {
 
   std::span<ServiceDefinition* const> set_;
   std::span<const ServiceDefinition* const> known_;
-  std::unordered_map<std::string, Named> names_ = {};  ///< by qualified name
+  std::map<std::string, Named> names_ = {};  ///< by qualified name
   std::vector<bool> has_error_;
   std::vector<Diagnostic> errors_ = {};
 };
@@ -85,7 +85,7 @@ void Resolver::index_entity(const EntityDefinition& entity, EntityDefinition* ow
 }
 
 void Resolver::check_imports() {
-  std::unordered_map<std::string_view, std::size_t> services;
+  std::map<std::string_view, std::size_t> services;
   for (std::size_t service = 0; service < set_.size(); ++service) {
     if (!services.emplace(set_[service]->name, service).second) refuse(service, 0, "a second definition of this name");
   }
@@ -150,7 +150,7 @@ std::string Resolver::qualified_name(const ServiceDefinition& from, const std::s
 
 /// Pods and namedarrays hold themselves nowhere; of namedarrays their elements are counted.
 void Resolver::check_containment() {
-  std::unordered_map<const EntityDefinition*, std::size_t> index;
+  std::map<const EntityDefinition*, std::size_t> index;
   std::vector<Named*> nodes;
   for (auto& [name, item] : names_) {
     if (!item.own || (item.type != DataType::pod_t && item.type != DataType::namedarray_t)) continue;

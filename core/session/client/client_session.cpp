@@ -7,6 +7,7 @@
 #include "core/member/error_entry.hpp"
 #include "core/member/member_table.hpp"
 #include "core/support/random.hpp"
+#include "core/support/sort.hpp"
 
 namespace rr {
 
@@ -100,7 +101,7 @@ void ClientSession::scan_deadlines(Now now) {
     else
       earliest_deadline_ = std::min(earliest_deadline_, pending.deadline);
   }
-  std::sort(expired.begin(), expired.end());
+  rr::sort(expired);
   for (const auto id : expired) {
     const auto found = pending_.find(id);
     if (found == pending_.end()) continue;
@@ -414,7 +415,7 @@ void ClientSession::fail(Error reason) {
       waiting.push_back(pending.fetch->lookup);
     else if (!is_connecting && !pending.is_abandoned && pending.type != EntryType::disconnect_client)
       waiting.push_back(id);
-  std::sort(waiting.begin(), waiting.end());
+  rr::sort(waiting);
   pending_.clear();
   callbacks_.clear();
   // Wires and pipes stay, unused: what emits an event may be in the middle of one.

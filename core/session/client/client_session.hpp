@@ -12,7 +12,6 @@
 #include <set>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <variant>
 #include <vector>
 
@@ -422,7 +421,7 @@ class ClientSession {
   std::uint32_t endpoint_;
 
   Message outgoing_;
-  using PendingRequests = std::unordered_map<RequestId, Pending>;
+  using PendingRequests = std::map<RequestId, Pending>;
   PendingRequests pending_;
   SpareNode<PendingRequests> spare_pending_;
   bool is_urgent_ = false;
