@@ -28,7 +28,8 @@ def messages(gateway, recording):
 def test_a_device_is_recorded_by_the_gateways_own_session(create, begin_gateway, mode):
     gateway = begin_gateway(create, mode=mode)
     recording = begin(gateway, interval_ms=100)
-    assert (recording["state"], recording["device"], recording["service"]) == ("waiting", "create", "Create")
+    assert recording["state"] in ("waiting", "recording")  # it may have all that it wants by now
+    assert (recording["device"], recording["service"]) == ("create", "Create")
     seen = wait_for(lambda: look(gateway, recording), lambda seen: seen["messages"] > 40)
     assert (seen["state"], seen["problem"], seen["standing"]) == ("recording", None, False)
     ended = stop(gateway, recording)
