@@ -199,8 +199,8 @@ void Access::record_tokens(const AccessState& before, const AccessState& now) {
 }
 
 void Access::record_users(const AccessState& before, const AccessState& now) {
-  using Users = rr::PasswordFileAuthenticator;
-  const auto tell = [this](std::string_view event, const std::string& name, const Users::Entry& of,
+  using UserFile = rr::PasswordFileAuthenticator;
+  const auto tell = [this](std::string_view event, const std::string& name, const UserFile::Entry& of,
                            bool is_other = false) {
     const auto detail = name + ": roles " + format_roles(of.privileges) + (is_other ? ", another password" : "");
     record({.event = event, .detail = detail});

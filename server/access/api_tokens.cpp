@@ -1,5 +1,6 @@
 #include "server/access/api_tokens.hpp"
 
+#include <algorithm>
 #include <charconv>
 
 #include "core/support/hex.hpp"
@@ -31,6 +32,13 @@ std::optional<unsigned> number_of(std::string_view text, std::size_t size) {
 std::string padded(unsigned number, std::size_t digits) {
   auto out = std::to_string(number);
   return std::string(digits - std::min(digits, out.size()), '0') + out;
+}
+
+/// The clock counts nanoseconds, from 1677 to 2262: days may be earlier and later.
+Identity::Time end_of(std::chrono::sys_days last_day) {
+  const auto end = last_day + std::chrono::days(1);
+  if (end > std::chrono::floor<std::chrono::days>(Identity::never)) return Identity::never;
+  return std::max(end, std::chrono::ceil<std::chrono::days>(Identity::Time::min()));
 }
 
 }  // namespace
@@ -115,7 +123,7 @@ std::optional<Identity> ApiTokens::find(std::string_view credential, std::chrono
   out.roles = out.proven_roles = entry.roles;
   out.proof = Proof::token;
   out.credential = credential;
-  if (entry.last_day) out.ends = *entry.last_day + std::chrono::days(1);
+  if (entry.last_day) out.ends = end_of(*entry.last_day);
   if (now >= out.ends) return std::nullopt;
   return out;
 }

@@ -1,14 +1,19 @@
 #include "server/record/recorder.hpp"
 
+#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 
 namespace rrgate {
 
 namespace asio = boost::asio;
 
 namespace {
+
+constexpr std::chrono::seconds follow_again_period{1};
 
 /// The types of a session, which live as long as its connection.
 std::shared_ptr<const rr::TypeRegistry> types_of(const std::shared_ptr<rr::ClientConnection>& connection) {
@@ -113,18 +118,50 @@ asio::awaitable<void> Recorder::follow(std::shared_ptr<rr::ClientConnection> con
   const auto received = [weak, member, types](const rr::Value& value, std::optional<rr::TimeSpec> sent) {
     if (const auto record = weak.lock()) record->write_value(member, *types, value, sent);
   };
+  const auto closed = [self = weak_from_this(), of = std::weak_ptr(connection), member] {
+    const auto recorder = self.lock();
+    if (!recorder || recorder->record_->is_closed()) return;
+    recorder->record_->tell_problem(member.name(), "the device has closed it");
+    const auto executor = recorder->io_.get_executor();
+    asio::co_spawn(executor, follow_again(executor, self, of, member), asio::detached);
+  };
   if (member.member->kind == rr::MemberKind::wire) {
     rr::ClientConnection::WireHandler handler = [received](const rr::Value& value, rr::TimeSpec time) {
       received(value, time);
     };
+    connection->on_wire_closed(member.path, name, closed);
     co_await object.connect_wire(name, std::move(handler));
   } else {
     rr::ClientConnection::PipeHandlers handlers;
     handlers.received = [received](const rr::Value& packet) { received(packet, {}); };
-    handlers.closed = [weak, member] {
-      if (const auto record = weak.lock()) record->tell_problem(member.name(), "the device has closed the pipe");
-    };
+    handlers.closed = closed;
     co_await object.connect_pipe(name, std::move(handlers));
+  }
+}
+
+asio::awaitable<void> Recorder::follow_again(asio::any_io_executor executor, std::weak_ptr<Recorder> by,
+                                             std::weak_ptr<rr::ClientConnection> connection,
+                                             RecordedMemberPlace member) {
+  asio::steady_timer timer(executor);
+  for (;;) {
+    timer.expires_after(follow_again_period);
+    co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
+    const auto self = by.lock();
+    const auto still_there = connection.lock();
+    if (!self || !still_there || still_there->is_closed() || self->record_->is_closed()) co_return;
+    std::string refusal;
+    try {
+      co_await find_object(still_there, member.path);  // which the device may have replaced
+      co_await self->follow(still_there, member);
+    } catch (const rr::Exception& failure) {
+      refusal = failure.what();
+    }
+    if (still_there->is_closed()) co_return;
+    if (refusal.empty()) {
+      self->record_->solve_problem(member.name());
+      co_return;
+    }
+    self->record_->tell_problem(member.name(), refusal);
   }
 }
 

@@ -30,6 +30,10 @@ class Recorder : public std::enable_shared_from_this<Recorder> {
   boost::asio::awaitable<void> handle_connected(rr::AsyncObject root);
   boost::asio::awaitable<void> record(rr::AsyncObject root);
   boost::asio::awaitable<void> follow(std::shared_ptr<rr::ClientConnection> connection, RecordedMemberPlace member);
+  /// A wire or pipe that the device has closed is asked for again and again, as long as the connection is the same.
+  static boost::asio::awaitable<void> follow_again(boost::asio::any_io_executor executor, std::weak_ptr<Recorder> by,
+                                                   std::weak_ptr<rr::ClientConnection> connection,
+                                                   RecordedMemberPlace member);
 
   boost::asio::io_context& io_;
   std::string url_;

@@ -220,6 +220,18 @@ void LockTable::handle_right_lost(LockClient client, std::string_view path, rr::
   take_back_monitor(monitor, 0);
 }
 
+void LockTable::handle_leased(LockClient client, std::string_view path, const rr::Error& why) {
+  const auto key = canonical_lock_path(path);
+  for (auto& [at, monitor] : monitors_) {
+    if (!rr::is_within(at, key)) continue;
+    std::erase_if(monitor.queue, [&](const Waiting& waiting) {
+      if (waiting.client == client) return false;
+      answer(waiting.client, waiting.request, why);
+      return true;
+    });
+  }
+}
+
 // --- object locks ---
 
 bool LockTable::owns(LockClient client, const Hold& lock) const {

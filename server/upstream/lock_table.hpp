@@ -87,6 +87,8 @@ class LockTable {
   void handle_released(std::string_view path, rr::TimePoint now);
   /// A client may not lock an object any more: what it has there is given back, and it is refused until it unlocks.
   void handle_right_lost(LockClient client, std::string_view path, rr::TimePoint now);
+  /// A client has the lease of an object: others who wait for a monitor there, or below, are refused with `why`.
+  void handle_leased(LockClient client, std::string_view path, const rr::Error& why);
   void handle_timeout(rr::TimePoint now);
 
   // --- asked ---

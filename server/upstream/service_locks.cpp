@@ -11,6 +11,8 @@ namespace rrgate {
 
 namespace {
 
+constexpr const char* right_is_gone = "its holder has no right to it any more";
+
 rr::TimePoint steady_now() {
   return std::chrono::steady_clock::now();
 }
@@ -88,8 +90,17 @@ void ServiceLocks::review(const UpstreamClient& client, const std::function<bool
   for (const auto& path : table_.paths_of(id))
     if (!may_lock(path)) table_.handle_right_lost(id, path, steady_now());
   for (const auto& lease : leases_.held())
-    if (lease.holder == id && !may_lock(lease.path))
-      leases_.handle_lost(lease.path, "its holder has no right to it any more");
+    if (lease.holder == id && !may_lock(lease.path)) leases_.handle_lost(lease.path, right_is_gone);
+  settle();
+}
+
+void ServiceLocks::review_leases() {
+  for (const auto& lease : leases_.held()) {
+    const auto holder =
+        std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) { return each.second == lease.holder; });
+    if (holder != clients_.end() && !holder->first->may_hold(lease.path))
+      leases_.handle_lost(lease.path, right_is_gone);
+  }
   settle();
 }
 
@@ -160,6 +171,7 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
   const bool is_new =
       result && (wanted.command == rr::LockCommand::acquire_lease || wanted.command == rr::LockCommand::take_lease);
   if (is_new) {
+    table_.handle_leased(id, wanted.path, leases_.check_lock(0, wanted.path, now).error());
     const auto key = canonical_lock_path(wanted.path);
     auto& holder = holders_[key];
     holder.upstream = client.upstream_in_use();

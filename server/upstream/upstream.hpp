@@ -52,6 +52,8 @@ class UpstreamClient {
   virtual bool has_role(std::string_view) const { return false; }
   /// What is to be recorded of the end of its lease; null: nothing.
   virtual AuditEntryPtr begin_lease_end(const std::string&) const { return nullptr; }
+  /// Whether it may hold the lease of an object still; see ServiceLocks::review_leases().
+  virtual bool may_hold(const std::string&) const { return true; }
   /// Its lease has ended.
   virtual void lease_ended(const std::string&, const std::string&) const {}
   /// The one that its requests go by.

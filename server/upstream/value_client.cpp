@@ -73,11 +73,17 @@ rr::awaitable<rr::Value> ValueClient::ask(rr::Called called) {
                           });
 }
 
+AccessRequest ValueClient::to_lock(const std::string& path) const {
+  return {
+      .device = upstream_->device().config().name, .service = upstream_->service(), .path = path, .verb = Verb::lock};
+}
+
 AuditEntryPtr ValueClient::begin_lease_end(const std::string& path) const {
-  if (!standing_) return nullptr;
-  return standing_->begin(
-      {.device = upstream_->device().config().name, .service = upstream_->service(), .path = path, .verb = Verb::lock},
-      "lease_end");
+  return standing_ ? standing_->begin(to_lock(path), "lease_end") : nullptr;
+}
+
+bool ValueClient::may_hold(const std::string& path) const {
+  return !standing_ || standing_->check(to_lock(path), Recorded::never).has_value();
 }
 
 rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string path,

@@ -136,6 +136,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   Subject lock_user() const override { return user_; }
   bool has_role(std::string_view role) const override { return standing_ && standing_->identity().has_role(role); }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
+  bool may_hold(const std::string& path) const override;
   void lease_ended(const std::string& path, const std::string& why) const override {
     if (on_lease_ended_) on_lease_ended_(path, why);
   }
@@ -158,6 +159,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void connection_lost(const rr::Error& reason) override;
   void found_again(const std::string& path) override;
 
+  AccessRequest to_lock(const std::string& path) const;
   rr::awaitable<rr::Result<>> join(Key key);
   void begin_joining(Topic& topic);
   void joined(const Key& key, const rr::Result<>& result);

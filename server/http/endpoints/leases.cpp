@@ -62,6 +62,11 @@ std::optional<std::string_view> lease_event(const ObjectRequest& request, const 
   return std::nullopt;
 }
 
+bool releases_own_lease(const ObjectRequest& request, const Target& target) {
+  return !target.member && request.method() == http::verb::post && request.option("lease") == "release" &&
+         target.client->has_lock(target.path());
+}
+
 rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target) {
   if (request.method() != http::verb::post) co_return request.method_response("POST");
   const auto what = request.option("lease").value_or("");

@@ -14,6 +14,8 @@ inline constexpr std::string_view lease_header = "Rrgate-Lease";
 /// The name of the record of a request: where it asks for a lease, that; empty: its verb. nullopt: it is not recorded,
 /// since a lease is renewed several times a second, and its end has a record of its own.
 std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target);
+/// Whether the request releases a lease that its client has: that takes no right.
+bool releases_own_lease(const ObjectRequest& request, const Target& target);
 /// One more client of the session that `asker` uses: it holds the lease of an object until it is gone, or the lease
 /// ends. Throws   rr::Exception.
 rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, std::shared_ptr<ValueClient> asker,

@@ -269,6 +269,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     error = client.error();
   }
   AuditEntryPtr entry;
+  const bool needs_right = target && !releases_own_lease(request, *target);
   if (target) {
     const auto wanted = access_request(*target, verb_of(request, *target));
     auto who = writer.request().identity;
@@ -277,7 +278,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     rr::Result<AuditEntryPtr> begun = AuditEntryPtr();
     if (event)
       begun = gateway.access().check_and_begin(who, wanted, trace, *event);
-    else if (const auto allowed = gateway.access().check(who, wanted); !allowed)
+    else if (const auto allowed = needs_right ? gateway.access().check(who, wanted) : rr::Result<>(); !allowed)
       begun = allowed.error();
     if (!begun) {
       co_await refuse(gateway, writer, begun.error());
@@ -304,7 +305,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     }
     // A body may take minutes, in which a right may be taken away.
     const auto still = standing.check(access_request(*target, verb_of(request, *target)), Recorded::never);
-    if (!still) {
+    if (!still && needs_right) {
       co_await refuse(gateway, writer, still.error());
       co_return;
     }

@@ -42,6 +42,23 @@ TEST_CASE("API tokens: made, kept as a hash, good until their last day") {
   CHECK_FALSE(tokens->verify(hash_api_token(token), at("2030-01-01")));
 }
 
+TEST_CASE("API tokens: a last day that the clock cannot count to is none") {
+  const auto token = make_api_token();
+  for (const auto* day : {"2262-04-10", "2262-04-11", "2262-04-12", "2300-01-01", "2900-06-01", "9999-12-31"}) {
+    INFO(day);
+    const auto tokens = ApiTokens::from_text("ci " + hash_api_token(token) + " operator " + day + "\n");
+    REQUIRE(tokens);
+    const auto found = tokens->verify(token, at("2030-01-01"));
+    REQUIRE(found);
+    CHECK(found->ends > at("2262-04-01"));
+  }
+  for (const auto* day : {"0000-01-01", "1600-01-01", "1677-09-20", "1970-01-01"}) {
+    INFO(day);
+    CHECK_FALSE(ApiTokens::from_text("ci " + hash_api_token(token) + " operator " + day + "\n")
+                    ->verify(token, at("2030-01-01")));
+  }
+}
+
 TEST_CASE("API tokens: what is wrong with a file") {
   const std::string hash(64, 'a');
   const auto problem = [](const std::string& text) {
