@@ -5,7 +5,7 @@ import { Store } from "../app/store";
 import { ApprovalNotices } from "./approval_notices";
 import { isRecord, text } from "./fields";
 import { reasonOf } from "./poller";
-import { problemOf } from "./session";
+import { expectOk, problemOf } from "./answer";
 import type { Session } from "./session";
 
 export interface Approval {
@@ -124,7 +124,7 @@ export class AgentsDesk {
     const response = await this.#session.fetch(`${PATH}/${path}`, init).catch((error: unknown) => {
       throw new Error(reasonOf(error), { cause: error });
     });
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
   }
 
   async #lookAgain(): Promise<void> {
