@@ -1,5 +1,4 @@
 // Mirrors web/src/gateway/answer.ts.
-import { describe, expect, it } from "vitest";
 import { expectOk } from "../../web/src/gateway/answer";
 
 const refused = (body: string) => expectOk(new Response(body, { status: 503 }));

@@ -167,6 +167,7 @@ test("a board is made by keyboard alone", async ({ page, lab }) => {
   await page.goto(`${lab.url}#/devices/webcams/Webcam?view=board`);
   await expect(page.locator(".board-panel").first()).toBeVisible();
   await page.getByRole("button", { name: "Arrange" }).focus();
+  await page.keyboard.press("Enter");
   await page.keyboard.press("Tab");
   await page.keyboard.type("Notes");
   await page.keyboard.press("Tab");
