@@ -23,7 +23,7 @@ import type { Tool, ToolAxis } from "./tools";
 const WIRE = "robot_state";
 
 export default function RobotPanel(props: PanelProps) {
-  const { object, reach, stopWithout, members, definitions, scope, settings, change } = props;
+  const { object, reach, stopWithout, members, definitions, scope, place, settings, change } = props;
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
   const state = readState(look.value);
@@ -132,7 +132,7 @@ export default function RobotPanel(props: PanelProps) {
           <output>{percent} %</output>
         </label>
       </div>
-      <ControlLine control={last} isThere={object !== null} />
+      <ControlLine control={last} isThere={object !== null} place={place} />
       <p class="note" role="status" hidden={halted === null || reach !== null}>
         {halted}
       </p>
