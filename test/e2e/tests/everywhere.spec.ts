@@ -62,7 +62,9 @@ for (const colorScheme of ["light", "dark"] as const) {
     try {
       await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
       for (const kind of PANEL_KINDS) {
-        const place = kind === "robot" ? `${robot.url}#/devices/peer/robot` : `${all.url}#/devices/big/interop`;
+        const place = ["robot", "trajectory"].includes(kind)
+          ? `${robot.url}#/devices/peer/robot`
+          : `${all.url}#/devices/big/interop`;
         const board = { board: 1, panels: [{ kind, x: 0, y: 0, w: 6, h: 12 }] };
         const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
         await page.goto(`${place}?view=board&board=${packed}`);
