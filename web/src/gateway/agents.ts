@@ -25,7 +25,7 @@ export interface Approval {
 
 export interface Agents {
   approvals: readonly Approval[];
-  /** Milliseconds, as Date.now() counts them; what is past: they are not stopped. */
+  /** Milliseconds, as Date.now() counts them; 0, or what is past: they are not stopped. */
   stoppedUntil: number;
 }
 
@@ -139,7 +139,7 @@ export function readAgents(answer: unknown, now = Date.now()): Agents {
   const after = (seconds: unknown): number => (typeof seconds === "number" ? now + seconds * 1000 : now);
   const list: unknown[] = Array.isArray(approvals) ? approvals : [];
   return {
-    stoppedUntil: after(stoppedFor),
+    stoppedUntil: stoppedFor === 0 ? 0 : after(stoppedFor), // a page whose clock ticks by the second would say "for 0 s"
     approvals: list
       .filter(isRecord)
       .filter((each) => text(each["id"]) !== "")
