@@ -29,7 +29,16 @@ export async function startPeer(script: string, service: string, more: object = 
 
 /** `script`: in the repository. */
 export function pythonProgram(script: string, args: readonly string[]): Program {
+  return pythonRun([path.join(repositoryRoot, script), ...args]);
+}
+
+/** An installed driver, by its module. */
+export function pythonDriver(module: string, args: readonly string[]): Program {
+  return pythonRun(["-m", module, ...args]);
+}
+
+function pythonRun(args: readonly string[]): Program {
   const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
   if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
-  return new Program(python, [path.join(repositoryRoot, script), ...args]);
+  return new Program(python, args);
 }

@@ -30,6 +30,7 @@ describe("agents", () => {
       approvals: [{ ...approval, values: '{"speed":1}', why: "to see", expiresAt: 21_000 }],
     });
     expect(readAgents(null, 1_000)).toEqual({ approvals: [], stoppedUntil: 1_000 });
+    expect(readAgents({ stopped_for: 0 }, 1_000).stoppedUntil).toBe(0);
   });
 
   it("are none where the gateway has no such address, and are forgotten with the right to decide", async () => {

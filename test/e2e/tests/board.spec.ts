@@ -2,7 +2,7 @@
 import { readFileSync } from "node:fs";
 import type { Page, WebSocketRoute } from "@playwright/test";
 import { expect, test } from "../lab_test";
-import { addPanel } from "../board";
+import { addPanel, arrange } from "../board";
 import { Program, rrgate, startGateway, webRoot } from "../processes";
 
 const panel = (page: Page, name: string) => page.getByRole("group", { name, exact: true });
@@ -104,6 +104,7 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
 
 test("a plot shows several members, in the address and after a reload", async ({ page, lab }) => {
   await openBoard(page, lab.url);
+  await arrange(page);
   await page.getByRole("button", { name: "As at first" }).click();
   await addPanel(page, "plot");
   const plot = page.locator('[data-panel="plot"]').last();
@@ -127,6 +128,7 @@ test("a plot shows several members, in the address and after a reload", async ({
   await page.reload();
   await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled, state.x");
   await expect(page.getByRole("group", { name: "DistanceTraveled, state" })).toBeVisible();
+  await arrange(page);
   await plot.getByRole("button", { name: "Take state off the plot" }).click();
   await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled");
 });
@@ -167,6 +169,7 @@ test("a removed panel and a replaced board come back by Undo, until the next cha
   expect(await place()).toEqual(before);
   await expect(undo).toBeHidden();
 
+  await arrange(page);
   await page.getByRole("button", { name: "As at first" }).click();
   await expect(notes).toHaveCount(0);
   await undo.click();
@@ -183,6 +186,7 @@ test("a removed panel and a replaced board come back by Undo, until the next cha
   await page.reload();
   await expect(text).toHaveValue("call Vera at 12");
 
+  await arrange(page);
   await page.getByRole("button", { name: "As at first" }).click();
   await addPanel(page, "locks");
   await expect(page.locator('[data-panel="locks"]')).toBeVisible();

@@ -62,7 +62,9 @@ for (const colorScheme of ["light", "dark"] as const) {
     try {
       await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
       for (const kind of PANEL_KINDS) {
-        const place = kind === "robot" ? `${robot.url}#/devices/peer/robot` : `${all.url}#/devices/big/interop`;
+        const place = ["robot", "trajectory"].includes(kind)
+          ? `${robot.url}#/devices/peer/robot`
+          : `${all.url}#/devices/big/interop`;
         const board = { board: 1, panels: [{ kind, x: 0, y: 0, w: 6, h: 12 }] };
         const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
         await page.goto(`${place}?view=board&board=${packed}`);
@@ -167,6 +169,7 @@ test("a board is made by keyboard alone", async ({ page, lab }) => {
   await page.goto(`${lab.url}#/devices/webcams/Webcam?view=board`);
   await expect(page.locator(".board-panel").first()).toBeVisible();
   await page.getByRole("button", { name: "Arrange" }).focus();
+  await page.keyboard.press("Enter");
   await page.keyboard.press("Tab");
   await page.keyboard.type("Notes");
   await page.keyboard.press("Tab");

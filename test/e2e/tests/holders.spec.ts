@@ -25,12 +25,13 @@ test("a lease of somebody else is shown while it lasts", async ({ page }) => {
   }
 });
 
-test("a lease has the name of who has it", async ({ page }) => {
+test("who would command sees who has the lease, and for how long", async ({ page }) => {
   const lab = await GuardedLab.start(webRoot, { device: { mode: "shared", leases: { takeover: ["*"] } } });
   try {
     const headers = { Authorization: `Bearer ${lab.token}` };
     const robot = `${lab.url}api/v1/devices/create/Create`;
-    expect((await fetch(`${robot}?lease=acquire&deadman=60000`, { method: "POST", headers })).ok).toBe(true);
+    const taken = await fetch(`${robot}?lease=acquire&deadman=60000`, { method: "POST", headers });
+    const { lease } = (await taken.json()) as { lease: string };
     await page.goto(`${lab.url}#/devices/create/Create?view=board`);
     await page.getByLabel("Name").fill("root");
     await page.getByLabel("Password or token").fill(password);
@@ -39,6 +40,12 @@ test("a lease has the name of who has it", async ({ page }) => {
     await expect(page.getByRole("list", { name: "Leases and locks" })).toHaveText(
       "Create: page has the lease, until 60 s after its last renewal",
     );
+
+    await page.getByRole("link", { name: "Drive" }).click();
+    const holder = page.locator("[data-holder]");
+    await expect(holder).toHaveText("page is in control, until 60 s after its last renewal");
+    await fetch(`${robot}?lease=release`, { method: "POST", headers: { ...headers, ["Rrgate-Lease"]: lease } });
+    await expect(holder).toHaveCount(0);
   } finally {
     await lab.stop();
   }

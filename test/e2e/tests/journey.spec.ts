@@ -60,6 +60,7 @@ inEachEngine((at) => {
 
     await visitor.see({ css: '[data-panel="plot"] .u-wrap canvas' });
     await visitor.see({ css: '[data-panel="plot"] .freshness' }, /a second/);
+    await visitor.press(button("Arrange"));
     await visitor.choose(field("Kind of panel"), "image");
     await visitor.press(button("Add panel"));
     await visitor.choose({ css: '[data-panel="image"] .panel-source select' }, "baxter/head_camera");
@@ -99,6 +100,7 @@ inEachEngine((at) => {
     await visitor.press(link("Board"));
     await visitor.see({ css: '[data-panel="plot"] .u-wrap canvas' });
     await visitor.see({ css: '[data-panel="plot"] .freshness' }, /a second/);
+    await visitor.press(button("Arrange"));
     await visitor.choose(field("Kind of panel"), "notes");
     await visitor.press(button("Add panel"));
     await visitor.write({ css: '[data-panel="notes"] textarea' }, "call Vera");

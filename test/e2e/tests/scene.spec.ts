@@ -145,7 +145,7 @@ test("three.js is loaded with the first 3-D panel of a board, not before", async
   const scripts: string[] = [];
   page.on("request", (request) => void (request.resourceType() === "script" && scripts.push(request.url())));
   await page.goto(`${lab.url}#/devices/webcams/Webcam?view=board`);
-  await expect(page.getByLabel("Kind of panel")).toBeVisible();
+  await expect(page.getByRole("button", { name: "Arrange" })).toBeVisible();
   expect(scripts.filter((each) => each.includes("scene_panel"))).toEqual([]);
   await addPanel(page, "scene");
   await expect(panel(page).locator("canvas")).toBeVisible();

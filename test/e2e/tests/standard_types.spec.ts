@@ -153,3 +153,44 @@ test("structs of structs are filled in, and a trajectory's generator says what i
   await generator.getByRole("button", { name: "Step", exact: true }).click();
   await expect(generator.getByRole("alert")).toContainText(/Exception|Error|RobotRaconteur/);
 });
+
+test("a trajectory through waypoints is run with its progress, stopped, and refused where it can't be", async ({
+  page,
+}) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  const panel = page.locator('[data-panel="trajectory"]');
+  const field = (name: string) => panel.getByRole("textbox", { name, exact: true });
+  const run = panel.getByRole("button", { name: "Run", exact: true });
+  const first = page.locator('[data-joint="0"] .joint-value');
+  const at = async () => Number.parseFloat(await first.innerText());
+  const start = await at();
+  await expect(run).toBeDisabled();
+  const add = panel.getByRole("button", { name: "Add where the robot is" });
+  await add.click();
+  await expect(field("Waypoint 1: joint_0")).toHaveValue(String(start));
+  await field("Waypoint 1: joint_0").fill(String(start + 0.5));
+  await add.click();
+  await expect(field("Waypoint 2: seconds")).toHaveValue("4");
+  await field("Waypoint 2: seconds").fill("40");
+  await field("Waypoint 2: joint_0").fill(String(start + 1.5));
+  await run.click();
+  await expect(page.getByRole("list", { name: "State" })).toContainText("trajectory");
+  await expect(panel.getByRole("progressbar")).toBeVisible();
+  await expect(panel).toContainText(/of 40\.0 s, 1 of 2 waypoints/);
+  await panel.getByRole("button", { name: "Stop trajectory" }).click();
+  await expect(panel.locator('[data-run="stopped"]')).toBeVisible();
+  const stopped = await at();
+  expect(stopped).toBeGreaterThanOrEqual(start + 0.499);
+  expect(stopped).toBeLessThan(start + 1.4);
+
+  await panel.getByRole("button", { name: "Remove 2" }).click();
+  await field("Waypoint 1: joint_0").fill("9");
+  await run.click();
+  await expect(panel.getByRole("alert").filter({ visible: true })).toHaveText(
+    "Waypoint 1: joint_0 is 9, its limits are -3 to 3 rad.",
+  );
+  await field("Waypoint 1: joint_0").fill(String(start));
+  await run.click();
+  await expect(panel.locator('[data-run="ended"]')).toBeVisible();
+  await expect.poll(async () => Math.abs((await at()) - start)).toBeLessThan(0.001);
+});

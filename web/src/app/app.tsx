@@ -22,7 +22,7 @@ import { ServicePage } from "../pages/service_page";
 import { RecordingsPage } from "../pages/recordings_page";
 import { AgentsPart } from "../pages/agents_part";
 import { Account, SignInPage } from "../pages/sign_in_page";
-import { Mark, SunMoonIcon } from "../ui/icons";
+import { LanguageIcon, Mark, SunMoonIcon } from "../ui/icons";
 
 interface AppParts {
   route: Store<Route>;
@@ -62,6 +62,7 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
           <Mark />
           <span>rrgate</span>
         </a>
+        <Places route={where} />
         <Crumbs route={where} />
         <Account session={session} ask={() => setAsked(true)} />
         <LanguageSelect />
@@ -113,6 +114,23 @@ function Page({ route: where, list, usb, access, agents, recordings, onlyStop }:
   );
 }
 
+/** The pages that are about no device. The way back to the first is the mark, where there is little room. */
+function Places({ route }: { route: Route }) {
+  const places = [
+    { page: "devices", href: "#/", text: t("Devices") },
+    { page: "recordings", href: "#/recordings", text: t("Recordings") },
+  ];
+  return (
+    <nav class={`places ${route.page === "service" ? "is-elsewhere" : ""}`} aria-label={t("Pages")}>
+      {places.map(({ page, href, text }) => (
+        <a key={page} href={href} aria-current={page === route.page ? "page" : undefined}>
+          {text}
+        </a>
+      ))}
+    </nav>
+  );
+}
+
 function Crumbs({ route }: { route: Route }) {
   if (route.page !== "service") return <span class="crumbs" />;
   const { device, service, path, view } = route;
@@ -153,13 +171,10 @@ function ThemeButton() {
 
 function LanguageSelect() {
   return (
-    <label>
+    <label class="icon-button language" title={LANGUAGES[language]}>
       <span class="unseen">{t("Language")}</span>
-      <select
-        class="field language"
-        value={language}
-        onChange={(event) => chooseLanguage(event.currentTarget.value as Language)}
-      >
+      <LanguageIcon />
+      <select value={language} onChange={(event) => chooseLanguage(event.currentTarget.value as Language)}>
         {Object.entries(LANGUAGES).map(([each, name]) => (
           <option key={each} value={each} lang={each}>
             {name}

@@ -12,6 +12,7 @@ export const PANEL_KINDS = [
   "form",
   "log",
   "robot",
+  "trajectory",
   "scene",
   "teleop",
   "pipe",

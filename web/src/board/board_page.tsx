@@ -267,6 +267,7 @@ interface BoardToolsProps {
 
 function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
   const file = useRef<HTMLInputElement>(null);
+  const isOpen = arranging || board.panels.length === 0; // nobody looks for the way to begin
   const [kind, setKind] = useState<PanelKind>("plot");
   const save = (): void =>
     saveFile(
@@ -289,29 +290,36 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
       <button class="button" type="button" aria-pressed={arranging} onClick={() => setArranging(!arranging)}>
         {arranging ? t("Done") : t("Arrange")}
       </button>
-      <label>
-        <span class="unseen">{t("Kind of panel")}</span>
-        <select
-          class="field"
-          value={kind}
-          onChange={(event) => setKind(PANEL_KINDS.find((each) => each === event.currentTarget.value) ?? "plot")}
-        >
-          {PANEL_KINDS.map((each) => (
-            <option key={each} value={each}>
-              {t(KINDS[each].title)}
-            </option>
-          ))}
-        </select>
-      </label>
-      <button class="button" type="button" onClick={() => add(kind)}>
-        {t("Add panel")}
-      </button>
-      <button class="button button-quiet" type="button" onClick={save}>
-        {t("Save file")}
-      </button>
-      <button class="button button-quiet" type="button" onClick={() => file.current?.click()}>
-        {t("Open file")}
-      </button>
+      {isOpen && (
+        <>
+          <label>
+            <span class="unseen">{t("Kind of panel")}</span>
+            <select
+              class="field"
+              value={kind}
+              onChange={(event) => setKind(PANEL_KINDS.find((each) => each === event.currentTarget.value) ?? "plot")}
+            >
+              {PANEL_KINDS.map((each) => (
+                <option key={each} value={each}>
+                  {t(KINDS[each].title)}
+                </option>
+              ))}
+            </select>
+          </label>
+          <button class="button" type="button" onClick={() => add(kind)}>
+            {t("Add panel")}
+          </button>
+          <button class="button button-quiet" type="button" onClick={save}>
+            {t("Save file")}
+          </button>
+          <button class="button button-quiet" type="button" onClick={() => file.current?.click()}>
+            {t("Open file")}
+          </button>
+          <button class="button button-quiet" type="button" onClick={reset}>
+            {t("As at first")}
+          </button>
+        </>
+      )}
       <input
         ref={file}
         type="file"
@@ -323,9 +331,6 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
           event.currentTarget.value = "";
         }}
       />
-      <button class="button button-quiet" type="button" onClick={reset}>
-        {t("As at first")}
-      </button>
     </div>
   );
 }

@@ -52,8 +52,7 @@ export function PanelFrame({
   const [device = place.device, service = place.service] =
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
   const safe = useSafe({ device, service }, list);
-  const kind = t(KINDS[panel.kind].title);
-  const remarks = [panel.from === "" ? "" : device, panel.object, kind].filter((each) => each !== "" && each !== name);
+  const remarks = [panel.from === "" ? "" : device, panel.object].filter((each) => each !== "" && each !== name);
   const drag = useDrag(panel, move);
   return (
     <div

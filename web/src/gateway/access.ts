@@ -3,7 +3,7 @@
 
 import { Store } from "../app/store";
 import { isRecord, text } from "./fields";
-import { problemOf } from "./session";
+import { expectOk } from "./answer";
 import type { Session } from "./session";
 
 export interface AccessRequest {
@@ -74,7 +74,7 @@ export class AccessDesk {
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify(body),
     });
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
   }
 }
 

@@ -3,7 +3,7 @@
 
 import { Store } from "../app/store";
 import { isRecord, text } from "./fields";
-import { problemOf } from "./session";
+import { expectOk } from "./answer";
 import type { Session } from "./session";
 
 export type AskState =
@@ -32,7 +32,7 @@ export class AccessAsk {
     this.state.value = { kind: "asking" };
     try {
       const response = await this.#send("", { name, reason });
-      if (!response.ok) throw new Error(await problemOf(response));
+      await expectOk(response);
       const answer: unknown = await response.json();
       if (!isRecord(answer)) throw new Error("the gateway gave the request no number");
       this.state.value = { kind: "waiting", name };

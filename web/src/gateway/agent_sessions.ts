@@ -4,7 +4,8 @@
 import { Store } from "../app/store";
 import { count, isRecord, text } from "./fields";
 import { Poller, reasonOf } from "./poller";
-import { problemOf, session } from "./session";
+import { problemOf } from "./answer";
+import { session } from "./session";
 
 export interface AgentCommand {
   /** Milliseconds, as Date.now() counts them. */

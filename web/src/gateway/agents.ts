@@ -5,7 +5,7 @@ import { Store } from "../app/store";
 import { ApprovalNotices } from "./approval_notices";
 import { isRecord, text } from "./fields";
 import { reasonOf } from "./poller";
-import { problemOf } from "./session";
+import { expectOk, problemOf } from "./answer";
 import type { Session } from "./session";
 
 export interface Approval {
@@ -25,7 +25,7 @@ export interface Approval {
 
 export interface Agents {
   approvals: readonly Approval[];
-  /** Milliseconds, as Date.now() counts them; what is past: they are not stopped. */
+  /** Milliseconds, as Date.now() counts them; 0, or what is past: they are not stopped. */
   stoppedUntil: number;
 }
 
@@ -124,7 +124,7 @@ export class AgentsDesk {
     const response = await this.#session.fetch(`${PATH}/${path}`, init).catch((error: unknown) => {
       throw new Error(reasonOf(error), { cause: error });
     });
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
   }
 
   async #lookAgain(): Promise<void> {
@@ -139,7 +139,7 @@ export function readAgents(answer: unknown, now = Date.now()): Agents {
   const after = (seconds: unknown): number => (typeof seconds === "number" ? now + seconds * 1000 : now);
   const list: unknown[] = Array.isArray(approvals) ? approvals : [];
   return {
-    stoppedUntil: after(stoppedFor),
+    stoppedUntil: stoppedFor === 0 ? 0 : after(stoppedFor), // a page whose clock ticks by the second would say "for 0 s"
     approvals: list
       .filter(isRecord)
       .filter((each) => text(each["id"]) !== "")

@@ -2,7 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/audit.
 
 import { count, isRecord, text } from "./fields";
-import { problemOf, session } from "./session";
+import { expectOk } from "./answer";
+import { session } from "./session";
 
 export interface Deed {
   /** The number of the record. */
@@ -38,7 +39,7 @@ export async function askDeeds(user: string, device: string, signal: AbortSignal
   if (user !== "") query.set("user", user);
   if (device !== "") query.set("device", device);
   const response = await session.fetch(`api/v1/audit?${query.toString()}`, { signal });
-  if (!response.ok) throw new Error(await problemOf(response));
+  await expectOk(response);
   return readDeeds(await response.json());
 }
 

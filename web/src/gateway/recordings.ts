@@ -4,7 +4,7 @@
 import { Store } from "../app/store";
 import { isRecord, text } from "./fields";
 import { Poller, reasonOf } from "./poller";
-import { problemOf } from "./session";
+import { expectOk, problemOf } from "./answer";
 import type { Session } from "./session";
 
 export interface RecordingFile {
@@ -98,7 +98,7 @@ export class RecordingDesk {
   async #ask(signal: AbortSignal): Promise<Recordings> {
     const response = await this.#session.fetch(PATH, { signal });
     if (response.status === 404) return readRecordings({});
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
     return readRecordings(await response.json());
   }
 

@@ -2,7 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/access.
 
 import { isRecord, text } from "./fields";
-import { problemOf, session } from "./session";
+import { expectOk } from "./answer";
+import { session } from "./session";
 
 export interface DeviceRights {
   device: string;
@@ -25,7 +26,7 @@ export interface Rights {
 /** @throws Error (rejects) with what the gateway says, or why it says nothing. */
 export async function askRights(signal: AbortSignal): Promise<Rights> {
   const response = await session.fetch("api/v1/access", { signal });
-  if (!response.ok) throw new Error(await problemOf(response));
+  await expectOk(response);
   return readRights(await response.json());
 }
 

@@ -2,6 +2,7 @@
 // one may, and released.
 // Layer: web/gateway. Source: docs/leases.md. By HTTP, so that it waits behind nothing that the page sends to the device.
 
+import { expectOk } from "./answer";
 import { session } from "./session";
 
 const TIMEOUT_MS = 2_000;
@@ -18,12 +19,6 @@ export async function makeSafe(device: string, service: string): Promise<void> {
   const got = await expectOk(taken.status === 403 ? await post(`acquire&deadman=${TIMEOUT_MS}`) : taken);
   const { lease } = (await got.json()) as { lease: string };
   await expectOk(await post("release", { ["Rrgate-Lease"]: lease }));
-}
-
-async function expectOk(response: Response): Promise<Response> {
-  if (response.ok) return response;
-  const problem = (await response.json().catch(() => null)) as { detail?: unknown } | null;
-  throw new Error(typeof problem?.detail === "string" ? problem.detail : `HTTP ${response.status}`);
 }
 
 /** Of what makes a device safe ("Create.Drive"), that of a service. */

@@ -3,6 +3,7 @@
 
 import { t } from "../app/language";
 import { Store } from "../app/store";
+import { expectOk } from "./answer";
 
 export interface Who {
   /** null: the page has shown nothing. */
@@ -48,7 +49,7 @@ export class Session {
     });
     if (response.status === 401)
       throw new Error(name === "" ? t("This token is not valid.") : t("Wrong name or password."));
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
     this.trouble.value = null;
     await this.#look();
   }
@@ -56,7 +57,7 @@ export class Session {
   /** @throws Error: the gateway could not be told. */
   async signOut(): Promise<void> {
     const response = await this.#ask("api/v1/session", { method: "DELETE" });
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
     this.trouble.value = null;
     // What the browser shows by itself, or nothing: until the gateway says so, nothing.
     if (this.who.value) this.who.value = { ...this.who.value, user: null, roles: [], session: false, admin: false };
@@ -78,7 +79,7 @@ export class Session {
     await this.#known;
     if (!this.who.value?.login || this.who.value.user === null) return url;
     const response = await this.fetch("api/v1/tickets", { method: "POST" });
-    if (!response.ok) throw new Error(await problemOf(response));
+    await expectOk(response);
     const { ticket } = (await response.json()) as { ticket: string };
     return `${url}&${new URLSearchParams({ ticket }).toString()}`;
   }
@@ -143,12 +144,6 @@ export function readWho(answer: unknown): Who {
 export function proofOf(name: string, secret: string): Record<string, string> {
   if (name.includes(":")) throw new Error(t("A name has no colon."));
   return name === "" ? { token: secret.trim() } : { user: name, password: secret };
-}
-
-/** What the gateway said about a request that it refused. */
-export async function problemOf(response: Response): Promise<string> {
-  const problem = (await response.json().catch(() => null)) as { detail?: unknown } | null;
-  return typeof problem?.detail === "string" ? problem.detail : t("the gateway answered {0}", response.status);
 }
 
 /** X-Requested-With: the page has a form, so no browser's dialog is wanted. */

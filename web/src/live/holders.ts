@@ -2,6 +2,7 @@
 // Layer: web/live. Source: robdef/org.rrgate.gateway.robdef.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
 import { socketUrl } from "../gateway/devices";
 import { isRecord, text } from "../gateway/fields";
@@ -18,6 +19,8 @@ export interface Holder {
   user: string;
   /** Of a lease: it ends so long after its last renewal. 0: of a lock. */
   deadmanMs: number;
+  /** Of a lease: to its end without another renewal, when the gateway was asked last. null: of a lock, or it does not tell. */
+  leftMs: number | null;
 }
 
 export interface Holders {
@@ -55,9 +58,31 @@ export function readHolders(leases: unknown, locks: unknown, device: string): Ho
   const held = of(leases).filter((each) => each["held"] === true);
   const base = (each: Record<string, unknown>) => ({ path: text(each["path"]), user: text(each["user"]) });
   return [
-    ...held.map((each) => ({ ...base(each), what: "lease" as const, deadmanMs: Number(each["deadman"]) })),
-    ...of(locks).map((each) => ({ ...base(each), what: kindOf(each["kind"]), deadmanMs: 0 })),
+    ...held.map((each) => ({
+      ...base(each),
+      what: "lease" as const,
+      deadmanMs: Number(each["deadman"]),
+      leftMs: leftOf(each["left"]),
+    })),
+    ...of(locks).map((each) => ({ ...base(each), what: kindOf(each["kind"]), deadmanMs: 0, leftMs: null })),
   ];
+}
+
+/** An older gateway does not tell. */
+function leftOf(left: unknown): number | null {
+  return typeof left === "number" ? left : null;
+}
+
+/** Whoever it is, in words. */
+export function nameOfHolder({ user }: Holder): string {
+  return user === "" ? t("somebody who is not signed in") : user;
+}
+
+/** When a lease ends, in words. */
+export function endOfLease({ deadmanMs, leftMs }: Holder): string {
+  return leftMs === null
+    ? t("until {0} s after its last renewal", deadmanMs / 1000)
+    : t("{0} s left, unless it is renewed", Math.ceil(leftMs / 1000));
 }
 
 /** Whether it is the object, or one above or below it. */

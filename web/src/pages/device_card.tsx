@@ -29,6 +29,12 @@ export function DeviceCard({ device, stale }: { device: Device; stale: boolean }
         )}
         <StateBadge state={device.state} text={stale ? t("was {0}", t(device.state)) : t(device.state)} />
       </div>
+      {device.state !== "online" && (
+        <p class="device-trouble">
+          {sentence(device.lastError ?? t("Not reached yet"))}{" "}
+          {!stale && !isUsb(device.name) && t("The gateway keeps trying.")}
+        </p>
+      )}
       <dl class="device-facts">
         <div>
           <dt>{t("Address")}</dt>
@@ -55,12 +61,6 @@ export function DeviceCard({ device, stale }: { device: Device; stale: boolean }
           </div>
         )}
       </dl>
-      {device.state !== "online" && (
-        <p class="device-trouble">
-          {sentence(device.lastError ?? t("Not reached yet"))}{" "}
-          {!stale && !isUsb(device.name) && t("The gateway keeps trying.")}
-        </p>
-      )}
       <ul class="services">
         {device.services.map((service) => (
           <li key={service.name}>
@@ -91,7 +91,16 @@ export function ServiceLink({ device, service }: { device: Device; service: Serv
   return (
     <a class="service" href={formatRoute(device.name, service.name)}>
       <span class="service-name">{service.name}</span>
-      <span class="code service-type">{service.type === "" ? t("type not read yet") : service.type}</span>
+      <span class="code service-type">
+        {service.type === ""
+          ? t("type not read yet")
+          : service.type.split(/(?<=\.)/).map((part) => (
+              <>
+                <wbr />
+                {part}
+              </>
+            ))}
+      </span>
     </a>
   );
 }

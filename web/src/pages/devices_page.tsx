@@ -28,15 +28,14 @@ export function DevicesPage({ list, usb, access, agents }: DevicesPageParts) {
   const devices = devicesOf(state);
   return (
     <div class="page page-narrow">
-      <h1>{t("Devices")}</h1>
-      <GatewayStrip state={state} />
+      <div class="service-head">
+        <h1>{t("Devices")}</h1>
+        <GatewayStrip state={state} />
+      </div>
       {state.kind === "loading" && <LoadingRows />}
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
       {devices && devices.length > 0 && <DeviceParts devices={devices} stale={state.kind === "away"} />}
       {usb.isPossible && <UsbPart usb={usb} />}
-      <p class="devices-more">
-        <a href="#/recordings">{t("Recordings")}</a>
-      </p>
       <AccessPart access={access} />
       <AgentSessionsPart agents={agents} />
       <AuditPart />
@@ -75,11 +74,7 @@ function UsbPart({ usb }: { usb: UsbDeviceList }) {
 function GatewayStrip({ state }: { state: GatewayState }) {
   const badge = { loading: "connecting", known: "online", away: "offline" } as const;
   return (
-    <section
-      class={`link-strip gateway-strip link-${badge[state.kind]}`}
-      aria-label={t("Gateway")}
-      data-gateway={state.kind}
-    >
+    <section class={`link-strip link-${badge[state.kind]}`} aria-label={t("Gateway")} data-gateway={state.kind}>
       <StateBadge
         state={badge[state.kind]}
         text={t({ loading: "asking", known: "gateway", away: "gateway away" }[state.kind])}
@@ -139,7 +134,7 @@ const EXAMPLE = `{
 function NoDevices() {
   return (
     <section class="empty">
-      <h2 class="place-name">{t("Uncharted waters")}</h2>
+      <h2 class="place-name">{t("No devices yet")}</h2>
       <p>{t("This gateway knows no devices yet. Name one in its configuration and it appears here by itself:")}</p>
       <pre class="code">{EXAMPLE}</pre>
       <p>

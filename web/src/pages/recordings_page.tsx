@@ -22,12 +22,18 @@ export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: Devi
   return (
     <div class="page page-narrow">
       <h1>{t("Recordings")}</h1>
-      {state && !state.enabled && <p>{t("This gateway records nothing: its configuration has no recordings.")}</p>}
+      {state && !state.enabled && (
+        <section class="empty">
+          <p>{t("This gateway records nothing: its configuration has no recordings.")}</p>
+          <p>{t("Name a folder for them there, and what devices say can be recorded and played again:")}</p>
+          <pre class="code">{EXAMPLE}</pre>
+        </section>
+      )}
       {state?.enabled && (
         <>
           <BeginForm desk={desk} list={list} />
           <p class="note">{t("{0} of {1} taken", bytesText(state.bytes), bytesText(state.maxBytes))}</p>
-          {state.list.length === 0 && <p>{t("There are no recordings yet.")}</p>}
+          {state.list.length === 0 && <p class="empty">{t("There are no recordings yet.")}</p>}
           <ul class="devices">
             {state.list.map((each) => (
               <RecordingRow key={each.name} recording={each} desk={desk} />
@@ -39,6 +45,8 @@ export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: Devi
     </div>
   );
 }
+
+const EXAMPLE = `"recordings": { "folder": "/var/lib/rrgate/recordings" }`;
 
 function BeginForm({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
   const devices = devicesOf(useStore(list.state)) ?? [];

@@ -112,6 +112,7 @@ export function RobotPage({ link, list, device, service, shown }: RobotPageProps
           lost={state.kind === "lost"}
           failure={driveFailure}
           device={device}
+          service={service}
         />
         <CameraView list={list} robot={device} shown={shown} />
       </div>

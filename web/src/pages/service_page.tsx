@@ -63,6 +63,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
       {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} />}
       {link && !onlyStop && <ReplayBar link={link} device={device} list={list} />}
+      {link && !onlyStop && <Unreached link={link} />}
       {isMissing && (
         <p class="empty">
           {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}
@@ -70,6 +71,23 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
         </p>
       )}
     </div>
+  );
+}
+
+/** Nothing is known of a service that was not reached since the page was opened. */
+function Unreached({ link }: { link: Link }) {
+  const { kind } = useStore(link.state);
+  const [wasOnline, setWasOnline] = useState(false);
+  useEffect(() => void (kind === "online" && setWasOnline(true)), [kind]);
+  if (wasOnline || kind !== "lost") return null;
+  return (
+    <section class="empty">
+      <h2>{t("Nothing to show yet")}</h2>
+      <p>{t("This service has not answered since the page was opened. It opens here by itself once it does.")}</p>
+      <a class="button" href="#/">
+        {t("All devices")}
+      </a>
+    </section>
   );
 }
 

@@ -43,6 +43,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
         }}
       >
         <h1 id="sign-in-title">{t("Sign in")}</h1>
+        <p class="sign-in-hint">{t("To the gateway {0}", location.host)}</p>
         <label>
           {t("Name")}
           <input

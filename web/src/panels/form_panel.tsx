@@ -1,7 +1,7 @@
 // Calls, properties to set, values to send: fields from the types, what came back, what was done before, and the same as code.
 // Layer: web/panels.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useAction } from "../members/row";
 import type { Member } from "../robot/remote";
@@ -28,7 +28,7 @@ export default function FormPanel(props: PanelProps) {
       .map((name) => choices.find((each) => each.name === name))
       .filter((each) => each !== undefined);
     return (
-      <div class="form-panel panel-scroll">
+      <div class="form-panel is-several panel-scroll">
         {shown.map((member) => (
           <MemberForm key={member.name} {...props} member={member} />
         ))}
@@ -68,7 +68,11 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
   const fit = (old: FormDrafts | null): FormDrafts => fitDrafts(old, inputs, definitions, scope);
   const [form, setForm] = useState(() => fit(null));
   const { drafts, emptied } = form;
-  const setDrafts = (next: FormDrafts["drafts"]): void => setForm((old) => ({ ...old, drafts: next, emptied: [] }));
+  const isTouched = useRef(false);
+  const setDrafts = (next: FormDrafts["drafts"]): void => {
+    isTouched.current = true;
+    setForm((old) => ({ ...old, drafts: next, emptied: [] }));
+  };
   const [done, setDone] = useState<readonly Done[]>([]);
   const doing = useAction();
   useEffect(() => setForm(fit), [member, definitions]); // types may be known only now
@@ -103,15 +107,26 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
       setDone((old) => [entry, ...old.slice(0, MOST_DONE - 1)]);
     });
   };
+  const isReadable = member.kind === "property" && !member.modifiers.includes("writeonly");
   const read = (): void =>
     doing.run(async () => {
       if (object) setDrafts([draftOf(await object.get(member.name), member.type, definitions, scope)]);
     });
+  // What a property is, not a 0 that nobody gave it; and never over what was typed in meanwhile.
+  useEffect(() => {
+    if (!object || !isReadable) return;
+    let isWanted = true;
+    object.get(member.name).then(
+      (value) => isWanted && !isTouched.current && setDrafts([draftOf(value, member.type, definitions, scope)]),
+      () => undefined, // whoever presses Read learns why
+    );
+    return () => void (isWanted = false);
+  }, [object, member, definitions]);
+  const isPlain = inputs.length === 0 && !withMore; // beside others of its kind its name says it all
   const word = member.kind === "function" ? t("Call") : member.kind === "property" ? t("Set") : t("Send");
   const [newest] = done;
   return (
-    <form class="member-form" onSubmit={submit} data-form={member.name}>
-      {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
+    <form class={`member-form ${isPlain ? "is-plain" : ""}`} onSubmit={submit} data-form={member.name}>
       {inputs.map(({ name, type }, i) => (
         <DraftInput
           key={name}
@@ -125,9 +140,10 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
       ))}
       <div class="row-line">
         <button class="button" type="submit" disabled={!object || doing.busy}>
-          {word} {member.name}
+          {isPlain ? <span class="unseen">{word} </span> : `${word} `}
+          {member.name}
         </button>
-        {member.kind === "property" && !member.modifiers.includes("writeonly") && (
+        {isReadable && (
           <button class="button button-quiet" type="button" disabled={!object || doing.busy} onClick={read}>
             {t("Read")}
             <span class="unseen"> {member.name}</span>
@@ -159,6 +175,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           (emptied.length > 0 ? t("Emptied, since its type has changed: {0}", emptied.join(", ")) : null)
         }
       />
+      {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
       {withMore && done.length > 0 && <History done={done} take={(before) => setForm(fit(before))} />}
       {withMore && <Code member={member} values={values} place={place} types={{ definitions, scope }} />}
     </form>

@@ -4,7 +4,7 @@
 import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
 import { isUsb } from "../gateway/usb_devices";
-import { useHolders } from "../live/holders";
+import { endOfLease, nameOfHolder, useHolders } from "../live/holders";
 import type { Holder } from "../live/holders";
 import { useAction } from "../members/row";
 import type { Remote } from "../robot/remote";
@@ -90,11 +90,12 @@ function HoldersList({ place }: Pick<PanelProps, "place">) {
   );
 }
 
-function wordsOf({ what, path, user, deadmanMs }: Holder): string {
-  const who = user === "" ? t("somebody who is not signed in") : user;
+function wordsOf(holder: Holder): string {
+  const { what, path } = holder;
+  const who = nameOfHolder(holder);
   switch (what) {
     case "lease":
-      return t("{0}: {1} has the lease, until {2} s after its last renewal", path, who, deadmanMs / 1000);
+      return t("{0}: {1} has the lease, {2}", path, who, endOfLease(holder));
     case "user":
       return t("{0}: locked for all clients of {1}", path, who);
     case "client":

@@ -80,6 +80,7 @@ export const KINDS: Readonly<Record<PanelKind, KindOfPanel>> = {
   },
   log: { title: "Events", load: () => import("./log_panel"), w: 4, h: 6, members: [] },
   robot: { title: "Joints", load: () => import("./robot_panel"), w: 6, h: 10, members: [] },
+  trajectory: { title: "Trajectory", load: () => import("./trajectory_panel"), w: 6, h: 9, members: [] },
   scene: {
     title: "3-D",
     load: () => import("./scene_panel"),

@@ -47,7 +47,10 @@ export function Freshness({ look, isLive }: { look: Look; isLive: boolean }) {
   const words = look.failure ?? (look.stale !== null && t("Stale: {0}", look.stale));
   const heard = look.feed?.pace.count ?? 0;
   return (
-    <p class={`freshness ${look.stale === null ? "" : "is-old"}`} data-stale={look.stale !== null}>
+    <p
+      class={look.failure !== null ? "failure" : `freshness ${look.stale === null ? "" : "is-old"}`}
+      data-stale={look.stale !== null}
+    >
       {words ||
         (look.rate > 0
           ? t("{0} a second", look.rate.toFixed(look.rate < 10 ? 1 : 0))

@@ -98,7 +98,7 @@ export default function PlotPanel(props: PanelProps) {
           sources.map(({ name }) => (
             <button
               key={name}
-              class="button button-quiet"
+              class="button button-quiet plot-off"
               type="button"
               aria-label={t("Take {0} off the plot", name)}
               onClick={() => set(chosen.filter(({ member }) => member !== name))}
@@ -243,9 +243,11 @@ function pathIn(name: string, path: string): string {
   return path === "" || path.startsWith("[") ? `${name}${path}` : `${name}.${path}`;
 }
 
-/** Clocks and counters tell little as lines. */
+/** Clocks, counters and the numbers of names tell little as lines. */
 function preferred(paths: readonly string[]): readonly string[] {
-  const telling = paths.filter((path) => !/(^|\.)(ts|seqno|seconds|nanoseconds|device_time)\b|flags|units/.test(path));
+  const telling = paths.filter(
+    (path) => !/(^|\.)(ts|seqno|seconds|nanoseconds|device_time)\b|flags|units|_(mode|state)$/.test(path),
+  );
   return telling.length > 0 ? telling : paths;
 }
 

@@ -23,7 +23,7 @@ import type { Tool, ToolAxis } from "./tools";
 const WIRE = "robot_state";
 
 export default function RobotPanel(props: PanelProps) {
-  const { object, reach, stopWithout, members, definitions, scope, settings, change } = props;
+  const { object, reach, stopWithout, members, definitions, scope, place, settings, change } = props;
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
   const state = readState(look.value);
@@ -115,7 +115,7 @@ export default function RobotPanel(props: PanelProps) {
           class="button"
           type="button"
           aria-pressed={mode === "jog"}
-          disabled={!object || acting.busy}
+          disabled={!object || acting.busy || look.failure !== null}
           onClick={beginJog}
         >
           {t("Jog")}
@@ -132,7 +132,7 @@ export default function RobotPanel(props: PanelProps) {
           <output>{percent} %</output>
         </label>
       </div>
-      <ControlLine control={last} isThere={object !== null} />
+      <ControlLine control={last} isThere={object !== null} place={place} />
       <p class="note" role="status" hidden={halted === null || reach !== null}>
         {halted}
       </p>
@@ -190,7 +190,7 @@ export default function RobotPanel(props: PanelProps) {
             )
           );
         })}
-      {!canJog && object && (
+      {!canJog && object && look.failure === null && (
         <p class="note">
           {look.stale === null ? t("Choose Jog to move the robot by hand.") : t("No jogging on old values.")}
         </p>
@@ -204,17 +204,16 @@ const JOG_SECONDS = 0.4; // the robot stops by itself when no more commands come
 
 function JointBar({ joint, position }: { joint: Joint; position: number }) {
   const has = Number.isFinite(joint.low) && joint.high > joint.low;
+  const [low, high] = has ? [joint.low, joint.high] : [-1, 1];
+  const share = has ? Math.min(1, Math.max(0, (position - low) / (high - low))) : 0.5;
+  const isNear = has && Math.abs(share - 0.5) > 0.45;
   return (
-    <meter
-      class="joint-bar"
-      aria-label={joint.name}
-      min={has ? joint.low : -1}
-      max={has ? joint.high : 1}
-      low={has ? joint.low + 0.05 * (joint.high - joint.low) : -1}
-      high={has ? joint.high - 0.05 * (joint.high - joint.low) : 1}
-      optimum={has ? (joint.low + joint.high) / 2 : 0}
-      value={has ? position : 0}
-      title={has ? t("{0} to {1}", formatNumber(joint.low), formatNumber(joint.high)) : t("no limits known")}
-    />
+    <span
+      class={`joint-bar ${isNear ? "is-near" : ""}`}
+      title={has ? t("{0} to {1}", formatNumber(low), formatNumber(high)) : t("no limits known")}
+    >
+      <meter class="unseen" aria-label={joint.name} min={low} max={high} value={has ? position : 0} />
+      {has && <span class="joint-mark" style={{ left: `${share * 100}%` }} />}
+    </span>
   );
 }

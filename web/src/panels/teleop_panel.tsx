@@ -24,7 +24,7 @@ import type { Axis, Deflection } from "./teleop";
 const REPEAT_MS = 100;
 
 export default function TeleopPanel(props: PanelProps) {
-  const { object, members, definitions, scope, settings, change } = props;
+  const { object, members, definitions, scope, place, settings, change } = props;
   const choices = membersFor("teleop", members);
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
@@ -77,7 +77,7 @@ export default function TeleopPanel(props: PanelProps) {
       <div class="panel-tools">
         <MemberSelect members={choices} chosen={name} choose={(next) => change({ member: next, axes: [] })} />
       </div>
-      <ControlLine control={last} isThere={object !== null} />
+      <ControlLine control={last} isThere={object !== null} place={place} />
       <div
         class={`teleop-pad ${enabled ? "" : "is-off"}`}
         role="application"

@@ -24,9 +24,20 @@ export interface DrivePanelProps {
   lost: boolean;
   failure: string | null;
   device: string;
+  service: string;
 }
 
-export function DrivePanel({ driver, control, enabled, shown, unsent, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({
+  driver,
+  control,
+  enabled,
+  shown,
+  unsent,
+  lost,
+  failure,
+  device,
+  service,
+}: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, { enabled, shown, unsent });
   return (
@@ -64,7 +75,7 @@ export function DrivePanel({ driver, control, enabled, shown, unsent, lost, fail
         />
         <output for="speed">{speed} mm/s</output>
       </div>
-      <ControlLine control={control} isThere={!lost} />
+      <ControlLine control={control} isThere={!lost} place={{ device, service, object: "" }} />
       <p class="note drive-note">
         {lost
           ? t("Driving is off: no connection to {0}. It comes back by itself.", device)

@@ -3,6 +3,8 @@
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
+import { isUsb } from "../gateway/usb_devices";
+import { endOfLease, nameOfHolder, useHolders } from "../live/holders";
 import { controlOf } from "../robot/control";
 import type { Control, ControlState } from "../robot/control";
 import type { Remote } from "../robot/remote";
@@ -31,9 +33,17 @@ export interface ControlLineProps {
   control: Control | null;
   /** Whether there is a device to command. */
   isThere: boolean;
+  /** What is commanded: who else has it is shown. */
+  place: Place;
 }
 
-export function ControlLine({ control, isThere }: ControlLineProps) {
+interface Place {
+  device: string;
+  service: string;
+  object: string;
+}
+
+export function ControlLine({ control, isThere, place }: ControlLineProps) {
   const state = useStore(control?.state ?? NOBODY);
   if (state.kind === "free") return <p class="control-line note">{t("Nobody gives leases of it: all may command.")}</p>;
   const take = (takeover: boolean): void => void control?.take(takeover).catch(() => undefined); // the state says why not
@@ -53,6 +63,9 @@ export function ControlLine({ control, isThere }: ControlLineProps) {
           {state.kind === "lost" && state.byOthers ? t("Take over") : t("Take control")}
         </button>
       )}
+      {isThere && !isUsb(place.device) && (state.kind === "idle" || state.kind === "lost") && (
+        <OtherHolder place={place} />
+      )}
       <p role="status" class={"reason" in state ? "failure" : "note"}>
         {state.kind === "held"
           ? t("You are in control since {0}.", clockTime(state.since))
@@ -61,5 +74,18 @@ export function ControlLine({ control, isThere }: ControlLineProps) {
             : t("Your first command takes control.")}
       </p>
     </div>
+  );
+}
+
+/** Who has the lease of it now, and for how long; nothing where it is free. */
+function OtherHolder({ place }: { place: Place }) {
+  const lease = useHolders(place).found?.find(({ what }) => what === "lease");
+  if (!lease) return null;
+  const shown = lease.leftMs !== null && lease.deadmanMs > 0;
+  return (
+    <p class="holder" data-holder={lease.user}>
+      {shown && <meter max={lease.deadmanMs} value={lease.leftMs ?? 0} aria-label={t("Time left")} />}{" "}
+      {t("{0} is in control, {1}", nameOfHolder(lease), endOfLease(lease))}
+    </p>
   );
 }

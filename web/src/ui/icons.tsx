@@ -22,6 +22,19 @@ export function Mark() {
   );
 }
 
+/** A globe. */
+export function LanguageIcon() {
+  return (
+    <Icon>
+      <g fill="none" stroke="currentColor" stroke-width="1.6">
+        <circle cx="10" cy="10" r="7" />
+        <ellipse cx="10" cy="10" rx="3" ry="7" />
+        <path d="M3.3 8h13.4M3.3 12h13.4" />
+      </g>
+    </Icon>
+  );
+}
+
 export function SunMoonIcon({ theme }: { theme: "system" | "light" | "dark" }) {
   if (theme === "light") {
     return (

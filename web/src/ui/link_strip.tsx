@@ -49,7 +49,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
 
 function headline(state: LinkState, device: string, service: string): string {
   if (state.kind === "connecting") return t("Connecting to {0}, service {1}", device, service);
-  if (state.kind === "online") return t("Connected to {0} since {1}", device, clockTime(state.since));
+  if (state.kind === "online") return t("Connected since {0}", clockTime(state.since));
   return t("No connection to {0} since {1}", device, clockTime(state.since));
 }
 
