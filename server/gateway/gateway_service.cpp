@@ -1,5 +1,7 @@
 #include "server/gateway/gateway_service.hpp"
 
+#include <algorithm>
+
 #include "server/config/version.hpp"
 #include "server/gateway/robdef_text.hpp"
 #include "server/log/log.hpp"
@@ -33,6 +35,12 @@ std::string to_string(HeldLock::Kind kind) {
   return kind == HeldLock::Kind::user ? "user" : kind == HeldLock::Kind::client ? "client" : "monitor";
 }
 
+/// In ms, from now.
+std::uint32_t left_until(rr::TimePoint deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+  return static_cast<std::uint32_t>(std::max(left, std::chrono::milliseconds{0}).count());
+}
+
 rr::Value describe(const std::string& device, const LeaseNews& news) {
   return rr::Structure{"org.rrgate.gateway.Lease",
                        {{"device", device},
@@ -40,6 +48,7 @@ rr::Value describe(const std::string& device, const LeaseNews& news) {
                         {"path", news.lease.path},
                         {"user", news.lease.by.name},
                         {"deadman", static_cast<std::uint32_t>(news.lease.deadman.count())},
+                        {"left", news.is_held ? left_until(news.lease.deadline) : 0U},
                         {"held", news.is_held},
                         {"reason", news.why}}};
 }

@@ -156,7 +156,7 @@ void LeaseTable::handle_timeout(rr::TimePoint now) {
 }
 
 void LeaseTable::end(Leases::iterator at, const std::string& why) {
-  HeldLease lease = std::move(at->second);
+  auto lease = std::move(at->second);
   lost_[{lease.holder, lease.path}] = why;
   leases_.erase(at);
   events_.push_back({std::move(lease), why});

@@ -27,6 +27,7 @@ struct HeldLease {
   LockClient holder = 0;
   Subject by;  ///< as whom the holder has taken it
   milliseconds deadman{0};
+  rr::TimePoint deadline;  ///< without another renewal
 };
 
 /// A lease is over: the device is to be made safe.
@@ -72,10 +73,7 @@ class LeaseTable {
   rr::Result<> check_lock(LockClient client, std::string_view path, rr::TimePoint now);
 
  private:
-  struct Lease : HeldLease {
-    rr::TimePoint deadline;
-  };
-  using Leases = std::map<std::string, Lease, std::less<>>;
+  using Leases = std::map<std::string, HeldLease, std::less<>>;
 
   void end(Leases::iterator at, const std::string& why);
   /// Those that a client has, and has lost, without those of an object and above and below it.

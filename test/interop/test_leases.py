@@ -159,6 +159,7 @@ def test_a_native_client_that_is_killed_leaves_the_device_safe(site, gateway):
         assert driver.stdout.readline() == b"drives\n"
         assert arm.speed == 2
         assert [(each.device, each.path, each.deadman, each.held) for each in gateway.leases] == [("interop", "plain", 20000, 1)]
+        assert 0 < gateway.leases[0].left <= 20000
         driver.kill()
         assert wait_for(lambda: is_safe(arm)) < SOON
     wait_for(lambda: len(news.all()) == 2)
