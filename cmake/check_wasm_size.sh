@@ -39,7 +39,7 @@ mapfile -t framework_files < <(for name in stores react svelte vue; do find_file
 mapfile -t losses_files < <(find_files -path "$directory/losses/*")
 mapfile -t lease_files < <(find_files -path "$directory/lease/*")
 mapfile -t worker_files < <(find_files \( -path "$directory/worker/*" -o -name worker.js -o -name worker_thread.js \) -not -name host.js)
-check client "${2:-123}" "${files[@]}"
+check client "${2:-120}" "${files[@]}"
 check "USB part" "${3:-20}" "${usb_files[@]}"
 check "part for leases" 2 "${lease_files[@]}"
 check "part for services" 144 "${serve_files[@]}"
