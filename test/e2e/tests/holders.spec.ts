@@ -47,7 +47,7 @@ test("who would command sees who has the lease, and for how long", async ({ page
 
     await page.getByRole("link", { name: "Drive" }).click();
     const holder = page.locator("[data-holder]");
-    await expect(holder).toHaveText(/^page is in control, [1-5]\d s left, unless it is renewed$/);
+    await expect(holder).toHaveText(/page is in control, [1-5]\d s left, unless it is renewed$/);
     await fetch(`${robot}?lease=release`, { method: "POST", headers: { ...headers, ["Rrgate-Lease"]: lease } });
     await expect(holder).toHaveCount(0);
   } finally {
