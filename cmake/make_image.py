@@ -128,9 +128,10 @@ def tree_of(package, libraries, config):
     # Scanners for known weaknesses look here where there is no dpkg.
     for name, deb in used.items():
         tree[f"var/lib/dpkg/status.d/{name}"] = (0o644, deb.control.encode())
-        terms = deb.files.get(deb.links.get(f"usr/share/doc/{name}", f"usr/share/doc/{name}") + "/copyright")
-        if terms:
-            tree[f"usr/share/doc/{name}/copyright"] = (0o644, terms[1])
+        # The terms of several packages of one source are in one of them.
+        terms = deb.links.get(f"usr/share/doc/{name}", f"usr/share/doc/{name}") + "/copyright"
+        for data in [each.files[terms][1] for each in (deb, *libraries.debs) if terms in each.files][:1]:
+            tree[f"usr/share/doc/{name}/copyright"] = (0o644, data)
     tree["etc/rrgate/gateway.json"] = (0o644, config)
     return tree | {name: (0o644, text) for name, text in USERS.items()}
 

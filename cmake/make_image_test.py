@@ -76,8 +76,10 @@ class Image(unittest.TestCase):
             {interpreter[1:]: f"/lib/{triplet}/{interpreter.split('/')[-1]}"})
         self.put_deb("debian", "libssl3", architecture, {
             f"usr/lib/{triplet}/libssl.so.3.0": elf(architecture, ["libcrypto.so.3"]), f"usr/lib/{triplet}/libcrypto.so.3": elf(architecture, ["libc.so.6"]),
-            f"usr/lib/{triplet}/libunused.so.1": elf(architecture)}, {f"usr/lib/{triplet}/libssl.so.3": "libssl.so.3.0"})
-        self.put_deb("debian", "unused", architecture, {f"usr/lib/{triplet}/libother.so.1": elf(architecture)})
+            f"usr/lib/{triplet}/libunused.so.1": elf(architecture)},
+            {f"usr/lib/{triplet}/libssl.so.3": "libssl.so.3.0", "usr/share/doc/libssl3": "openssl-base"})
+        self.put_deb("debian", "openssl-base", architecture, {f"usr/lib/{triplet}/libother.so.1": elf(architecture),
+                                                              "usr/share/doc/openssl-base/copyright": b"terms of both"})
         return ours
 
     def run_tool(self, package, name="image.tar"):
@@ -127,7 +129,7 @@ class Image(unittest.TestCase):
         self.assertEqual({name for name, member in members.items() if member.isfile()}, {
             "usr/bin/rrgate", "usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html", interpreter[1:],
             f"usr/lib/{triplet}/{interpreter.split('/')[-1]}", "etc/passwd", "etc/group", "etc/rrgate/gateway.json", "usr/share/doc/libc6/copyright",
-            *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
+            "usr/share/doc/libssl3/copyright", *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
             *(f"var/lib/dpkg/status.d/{name}" for name in ("rrgate", "libc6", "libssl3"))})
         self.assertEqual((members["tmp"].mode, members["usr/bin/rrgate"].mode, members["etc/passwd"].mode), (0o1777, 0o755, 0o644))
         self.assertTrue(all((member.uid, member.gid, member.mtime) == (0, 0, 1700000000) for member in members.values()))

@@ -90,6 +90,7 @@ def image(request, podman, tmp_path_factory):
 @pytest.fixture(scope="module")
 def packaged(podman, tmp_path_factory):
     """Of the package that ./dev test made, in the archive that is given to `docker load`."""
+    need("image-debs")
     (deb,) = PACKAGES.glob("rrgate_*_amd64.deb")
     archive = tmp_path_factory.mktemp("archive") / "image.tar"
     subprocess.run([sys.executable, "-B", ROOT / "cmake/make_image.py", "--package", deb, "--debian", DEPS / "image-debs-amd64",
