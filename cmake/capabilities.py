@@ -91,6 +91,12 @@ def containers():
                  "mount -t overlay o -o lowerdir=/mnt/low,upperdir=/mnt/up,workdir=/mnt/work /mnt/all")
 
 
+def image_debs():
+    """Debian's packages of shared libraries, for images that are made without a registry."""
+    if not (DEPS / "image-debs-amd64" / "complete").exists():
+        raise Lacking("there are no packages in build/deps/image-debs-amd64, which mmdebstrap gets in ./dev test")
+
+
 def debian_root():
     """A fresh Debian to install packages into, by root."""
     need_root()
@@ -127,7 +133,7 @@ def apparmor():
 
 
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
-                "containers": containers, "debian-root": debian_root, "guest": guest, "firefox": firefox, "webkit": webkit,
+                "containers": containers, "debian-root": debian_root, "image-debs": image_debs, "guest": guest, "firefox": firefox, "webkit": webkit,
                 "systemd": systemd, "apparmor": apparmor}
 
 

@@ -63,6 +63,8 @@ class Dev(unittest.TestCase):
     def test_unknown_words_are_refused_before_anything_is_done(self):
         self.check_refused('unknown command "biuld"', "biuld")
         self.check_refused('setup: unknown word "produkt"; expected product, or nothing', "setup", "produkt")
+        self.check_refused('package: unknown word "imege"; expected --check, arm64 or image', "package", "imege")
+        self.check_refused('package image: unknown architecture "mips"; expected amd64 or arm64', "package", "image", "amd64", "mips")
         for command in ("asan", "tsan", "debian13"):
             self.check_refused(f'{command}: unknown part "web"; expected core, node, server or examples', command, "core", "web")
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""make_sbom.py --version V --output FILE PACKAGE.deb... package-lock.json...
+"""make_sbom.py --version V --output FILE PACKAGE.deb... IMAGE.tar... package-lock.json...
 
 What a release is made of, as SPDX 2.3 in JSON: the packages, the shared libraries that dpkg-shlibdeps found they need, what
-they are compiled with (Depends of rrgate-dev), and the npm packages that are in the page or in the documentation, or come
-with the client.
+they are compiled with (Depends of rrgate-dev), the Debian packages whose files are in the container images, and the npm packages
+that are in the page or in the documentation, or come with the client.
 Source: https://spdx.github.io/spdx-spec/v2.3/
 """
 import argparse
@@ -14,6 +14,7 @@ import os
 import pathlib
 import re
 import subprocess
+import tarfile
 
 
 def output_of(*command):
@@ -43,6 +44,24 @@ def debian_dependencies(deb):
             yield package(name, version, f"pkg:deb/debian/{name}@{version}")
 
 
+def image_contents(image):
+    """Debian packages of which files are in it, as it says itself."""
+    with tarfile.open(image) as archive:
+        (about,) = json.load(archive.extractfile("manifest.json"))
+        for layer in about["Layers"]:
+            with tarfile.open(fileobj=archive.extractfile(layer), mode="r:gz") as files:
+                for member in files:
+                    if member.isfile() and member.name.startswith("var/lib/dpkg/status.d/"):
+                        fields = dict(re.findall(r"^([A-Z][A-Za-z-]*): (.*)$", files.extractfile(member).read().decode(), re.M))
+                        name, version, architecture = (fields[key] for key in ("Package", "Version", "Architecture"))
+                        is_ours = name == "rrgate"
+                        entry = package(name, version, None if is_ours else f"pkg:deb/debian/{name}@{version}?arch={architecture}")
+                        entry["SPDXID"] += f"-{architecture}"
+                        if is_ours:
+                            entry["licenseDeclared"] = "Apache-2.0"
+                        yield entry
+
+
 def npm_dependencies(lock):
     for path, about in json.loads(lock.read_text())["packages"].items():
         if path.startswith("node_modules/") and not about.get("dev") and not about.get("link"):
@@ -64,17 +83,21 @@ def main():
     product["SPDXID"] = "SPDXRef-product"
     packages[product["SPDXID"]] = product
     for path in arguments.inputs:
-        if path.suffix == ".deb":
+        kind, owner = "DEPENDS_ON", product
+        if path.suffix == ".json":
+            needed = npm_dependencies(path)
+        else:
             owner = package(path.name, arguments.version, checksum=hashlib.sha256(path.read_bytes()).hexdigest())
-            owner["licenseDeclared"] = "Apache-2.0"
             packages[owner["SPDXID"]] = owner
             relations.add((product["SPDXID"], "CONTAINS", owner["SPDXID"]))
-            needed = debian_dependencies(path)
-        else:
-            owner, needed = product, npm_dependencies(path)
+            if path.suffix == ".deb":
+                owner["licenseDeclared"] = "Apache-2.0"
+                needed = debian_dependencies(path)
+            else:
+                kind, needed = "CONTAINS", image_contents(path)
         for entry in needed:
             packages[entry["SPDXID"]] = entry
-            relations.add((owner["SPDXID"], "DEPENDS_ON", entry["SPDXID"]))
+            relations.add((owner["SPDXID"], kind, entry["SPDXID"]))
     made = datetime.datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), datetime.timezone.utc)
     content = sorted(packages.values(), key=lambda entry: entry["SPDXID"])
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()

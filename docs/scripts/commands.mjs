@@ -12,10 +12,20 @@ export function commandsPage(repository) {
     return `${intro}\nThis site was made without the program: \`rrgate --help\` lists the commands.\n`;
   }
   const help = (...words) => execFileSync(program, [...words, "--help"], { encoding: "utf8" }).trimEnd();
-  const overview = help();
-  const names = [...overview.matchAll(/^ +(?:rrgate )?([a-z][a-z-]*)(?= |$)/gm)].map(([, name]) => name);
-  const commands = [...new Set(names)].filter((name) => name !== "rrgate");
-  if (commands.length === 0) throw new Error(`${program} --help lists no commands`);
   const block = (text) => `\`\`\`txt\n${text}\n\`\`\`\n`;
-  return [intro, block(overview), ...commands.map((name) => `## rrgate ${name}\n\n${block(help(name))}`)].join("\n");
+  const sections = commandsIn(help(), []).flatMap((words) => sectionsOf(words));
+  if (sections.length === 0) throw new Error(`${program} --help lists no commands`);
+  return [intro, block(help()), ...sections].join("\n");
+
+  /** The command's own help, then that of the commands below it ("cert ca"). */
+  function sectionsOf(words) {
+    const text = help(...words);
+    const heading = `${"#".repeat(1 + words.length)} rrgate ${words.join(" ")}`;
+    return [`${heading}\n\n${block(text)}`, ...commandsIn(text, words).flatMap((below) => sectionsOf(below))];
+  }
+}
+
+/** The commands that a help lists, as the words that call them. */
+function commandsIn(text, above) {
+  return [...text.matchAll(/^ {2}([a-z][a-z-]*) {2,}[A-Z]/gm)].map(([, name]) => [...above, name]);
 }

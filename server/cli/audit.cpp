@@ -170,6 +170,7 @@ int read_audit(const AuditOptions& given) {
 
 void add_audit(Commands& commands) {
   const auto [app, options] = commands.add("audit", "Read and verify the audit log", read_audit);
+  app.footer("Exit codes: 0 done; 1 the chain is broken; 2 wrong options or arguments; 3 a file can't be read");
   app.add_option("FILE", options.files, "The file of the option \"audit\", and rotated files; in any order")
       ->required()
       ->option_text("...");

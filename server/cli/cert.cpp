@@ -4,6 +4,7 @@
 #include "server/cli/cert.hpp"
 
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "core/session/start_tls.hpp"
 #include "core/support/random.hpp"
@@ -28,8 +29,8 @@ constexpr std::int64_t clock_slack = 3600;  // of machines in the lab, in second
 constexpr std::string_view node_ca = "node-ca";
 constexpr std::string_view web_ca = "web-ca";
 
-rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, std::string_view chain, bool force,
-                        rr::SecretReaders readers) {
+rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, bool force, rr::SecretReaders readers,
+                        CertificateFiles& written) {
   std::error_code error;
   for (const auto* ending : {".pem", ".key"})
     if (!force && fs::exists(stem.string() + ending, error))
@@ -37,8 +38,11 @@ rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair,
                             stem.string() + ending + ": is there already; --force replaces it");
   if (auto done = rr::write_secret(stem.string() + ".key", pair.key, force, readers); !done) return done;
   // Certificates are no secrets; the service that answers with one must read it, and so may it a CA's.
-  return rr::write_secret(stem.string() + ".pem", pair.certificate + std::string(chain), force,
-                          rr::SecretReaders::folder_group);
+  if (auto done = rr::write_secret(stem.string() + ".pem", pair.certificate, force, rr::SecretReaders::folder_group);
+      !done)
+    return done;
+  for (const auto* ending : {".pem", ".key"}) written.emplace_back(stem.string() + ending);
+  return {};
 }
 
 rr::Result<rr::CertificateAndKey> read_ca(const fs::path& folder, std::string_view name) {
@@ -95,7 +99,36 @@ int make_node_certificate(const NodeCertificateOptions& options) {
   if (!bundle) return report_failure("cert", bundle.error().message);
   if (auto done = rr::write_secret(*path, rr::as_text(*bundle), options.force); !done)
     return report_failure("cert", done.error().message);
-  std::cout << *path << "\n";
+  if (options.is_json)
+    print_json_line({{"node", rr::format_node_id(*id)}, {"files", nlohmann::ordered_json::array({*path})}});
+  else
+    std::cout << *path << "\n";
+  return exit_ok;
+}
+
+nlohmann::ordered_json names_of(const CertificateFiles& files) {
+  auto out = nlohmann::ordered_json::array();
+  for (const auto& file : files) out.push_back(file.string());
+  return out;
+}
+
+int run_authorities(const CertificateOptions& options) {
+  const auto files = make_authorities(options);
+  if (!files) return report_failure("cert", files.error().message);
+  if (options.is_json)
+    print_json_line({{"files", names_of(*files)}});
+  else
+    print_authorities(*files);
+  return exit_ok;
+}
+
+int run_web_certificate(const WebCertificateOptions& options) {
+  const auto files = make_web_certificate(options);
+  if (!files) return report_failure("cert", files.error().message);
+  if (options.is_json)
+    print_json_line({{"hosts", options.hosts}, {"files", names_of(*files)}});
+  else
+    print_web_certificate(*files);
   return exit_ok;
 }
 
@@ -104,11 +137,13 @@ void add_certificate_options(CLI::App& app, CertificateOptions& options) {
   app.add_option("FOLDER", options.folder, "Where the CAs are")->required()->option_text(" ");
   app.add_option("--days", options.days, "How long it is good")->check(CLI::Range(1, 36500))->option_text("N");
   app.add_flag("--force", options.force, "Replace what is there");
+  app.add_flag("--json", options.is_json, "Print the files as one line of JSON");
 }
 
 }  // namespace
 
-int make_authorities(const CertificateOptions& options) {
+rr::Result<CertificateFiles> make_authorities(const CertificateOptions& options) {
+  CertificateFiles files;
   struct Kind {
     std::string_view file;
     std::string_view name;
@@ -125,41 +160,50 @@ int make_authorities(const CertificateOptions& options) {
     wish.begins_after_seconds = -clock_slack;
     wish.ends_after_seconds = options.days * day;
     const auto made = rr::issue_certificate(wish, nullptr);
-    if (!made) return report_failure("cert", made.error().message);
-    if (auto done = write_pair(options.folder / kind.file, *made, {}, options.force, rr::SecretReaders::owner); !done)
-      return report_failure("cert", done.error().message);
-    std::cout << (options.folder / kind.file).string() << ".pem\n";
+    if (!made) return made.error();
+    if (auto done = write_pair(options.folder / kind.file, *made, options.force, rr::SecretReaders::owner, files);
+        !done)
+      return done.error();
   }
-  std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
-               "are told by\n  export ROBOTRACONTEUR_SSL_CERT_FILE="
-            << fs::absolute(options.folder / node_ca).string() << ".pem\n";
-  return exit_ok;
+  return files;
 }
 
-int make_web_certificate(const WebCertificateOptions& options) {
+void print_authorities(const CertificateFiles& files) {
+  for (const auto& file : files)
+    if (file.extension() == ".pem") std::cout << file.string() << "\n";
+  std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
+               "are told by\n  export ROBOTRACONTEUR_SSL_CERT_FILE="
+            << fs::absolute(files.front()).string() << "\n";
+}
+
+rr::Result<CertificateFiles> make_web_certificate(const WebCertificateOptions& options) {
   const auto ca = read_ca(options.folder, web_ca);
-  if (!ca) return report_failure("cert", ca.error().message);
+  if (!ca) return ca.error();
   rr::CertificateWish wish;
   wish.common_name = options.hosts.front().substr(0, 64);
   wish.hosts = options.hosts;
   wish.begins_after_seconds = -clock_slack;
   wish.ends_after_seconds = options.days * day;
   const auto made = rr::issue_certificate(wish, &*ca);
-  if (!made) return report_failure("cert", made.error().message);
+  if (!made) return made.error();
   auto name = options.hosts.front();
   for (auto& letter : name)
     if (letter == '*' || letter == ':') letter = '_';
-  const auto stem = options.folder / name;
-  if (auto done = write_pair(stem, *made, {}, options.force, rr::SecretReaders::folder_group); !done)
-    return report_failure("cert", done.error().message);
-  std::cout << stem.string() << ".pem\n" << stem.string() << ".key\n";
-  return exit_ok;
+  CertificateFiles files;
+  if (auto done = write_pair(options.folder / name, *made, options.force, rr::SecretReaders::folder_group, files);
+      !done)
+    return done.error();
+  return files;
+}
+
+void print_web_certificate(const CertificateFiles& files) {
+  for (const auto& file : files) std::cout << file.string() << "\n";
 }
 
 void add_cert(Commands& commands) {
   auto& group = commands.add_group("cert", "Make certificates for nodes and for HTTPS");
   const auto [ca, authorities] =
-      commands.add("ca", "Make two CAs, for nodes and for web servers", make_authorities, &group);
+      commands.add("ca", "Make two CAs, for nodes and for web servers", run_authorities, &group);
   authorities.days = 3650;
   add_certificate_options(ca, authorities);
 
@@ -170,7 +214,7 @@ void add_cert(Commands& commands) {
   node.add_option("--output", one.output, "Folder for it; without it where nodes look")->option_text("FOLDER");
 
   const auto [web, server] =
-      commands.add("web", "Make a certificate for a web server (HTTPS)", make_web_certificate, &group);
+      commands.add("web", "Make a certificate for a web server (HTTPS)", run_web_certificate, &group);
   add_certificate_options(web, server);
   web.add_option("HOST", server.hosts, "Names and addresses of the server")->required()->option_text("...");
 }

@@ -1,6 +1,4 @@
 // rrgate check: whether service definitions are good. Layer: server/cli.
-#include <nlohmann/json.hpp>
-
 #include "server/cli/definition_options.hpp"
 
 namespace rrgate {
@@ -11,21 +9,10 @@ struct CheckDefinitionsOptions : DefinitionOptions {
   bool is_json = false;
 };
 
-void print_diagnostic(const rr::Diagnostic& diagnostic) {
-  auto json = nlohmann::ordered_json::object();
-  json["file"] = diagnostic.file;
-  json["line"] = diagnostic.column != 0 ? diagnostic.column_line : diagnostic.line;
-  if (diagnostic.column != 0) json["column"] = diagnostic.column;
-  json["severity"] = diagnostic.severity == rr::Severity::error ? "error" : "warning";
-  json["code"] = diagnostic.code;
-  json["message"] = diagnostic.message;
-  print_json_line(json);
-}
-
 int check(const CheckDefinitionsOptions& options) {
   const auto set = DefinitionSet::from_files(options.files, options.folders, options.mode());
   if (options.is_json) {
-    for (const auto& diagnostic : set.diagnostics()) print_diagnostic(diagnostic);
+    for (const auto& diagnostic : set.diagnostics()) print_json_diagnostic(diagnostic);
     return set.is_good() ? exit_ok : exit_failed;
   }
   if (!report_diagnostics(set)) return exit_failed;

@@ -78,6 +78,7 @@ int check_config(const CheckOptions& options) {
 
 void add_check_config(Commands& commands) {
   const auto [app, options] = commands.add("check-config", "Check a configuration", check_config);
+  app.footer("Exit codes: 0 good; 1 failed; 2 the configuration has errors, or wrong options or arguments");
   app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
   app.add_option("--as-service", options.service_user, "Also report files that this user can't read or write")
       ->option_text("USER");

@@ -31,6 +31,7 @@ CLI::App& Commands::add_group(const std::string& name, const std::string& summar
 
 CLI::App* Commands::add_app(const std::string& name, const std::string& summary, CLI::App& below) {
   auto* app = below.add_subcommand(name, summary)->require_subcommand(0, 1);
+  app->footer(exit_codes);
   return app->group(&below == &app_ ? heading_ : "Commands");
 }
 

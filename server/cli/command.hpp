@@ -14,6 +14,8 @@ namespace rrgate {
 /// Exit codes: done; failed while running; not understood (arguments or configuration); of `audit`, a file that can't
 /// be read, which says nothing of its chain.
 enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2, exit_unreadable = 3 };
+/// The end of a command's help, unless it has codes of its own.
+inline constexpr const char* exit_codes = "Exit codes: 0 done; 1 failed; 2 wrong options or arguments";
 
 /// A command before the program runs it: its options, bound to `values`.
 template <class Options>

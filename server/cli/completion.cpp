@@ -4,6 +4,7 @@
 // asks devices for their members.
 #include <algorithm>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "server/cli/ls.hpp"
 #include "server/cli/remote_service.hpp"
@@ -154,19 +155,34 @@ struct CompletionOptions {
   const CLI::App* program = nullptr;
   std::string shell;
   std::vector<std::string> words;
+  bool is_json = false;
 };
 
+std::string_view script_of(std::string_view shell) {
+  if (shell == "bash") return bash_script;
+  return shell == "zsh" ? zsh_script : fish_script;
+}
+
 int complete(const CompletionOptions& options) {
-  if (options.shell == "bash") std::cout << bash_script;
-  if (options.shell == "zsh") std::cout << zsh_script;
-  if (options.shell == "fish") std::cout << fish_script;
+  if (options.shell != "words") {
+    if (options.is_json)
+      print_json_line({{"shell", options.shell}, {"script", script_of(options.shell)}});
+    else
+      std::cout << script_of(options.shell);
+    return exit_ok;
+  }
   if (options.words.empty()) return exit_ok;
+  auto found = nlohmann::ordered_json::array();
   try {
     for (const auto& each : candidates(*options.program, options.words))
-      if (each.starts_with(options.words.back())) std::cout << each << "\n";
+      if (each.starts_with(options.words.back())) found.push_back(each);
   } catch (const std::exception&) {
     return exit_failed;  // whoever types sees no candidates; the command itself will tell why
   }
+  if (options.is_json)
+    print_json_line({{"words", found}});
+  else
+    for (const auto& each : found) std::cout << each.get_ref<const std::string&>() << "\n";
   return exit_ok;
 }
 
@@ -180,7 +196,8 @@ void add_completion(Commands& commands) {
       ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}))
       ->option_text(" ");
   app.add_option("WORD", options.words, "Words of a command line, after --")->option_text("...");
-  app.footer("For bash: source <(rrgate completion bash)");
+  app.add_flag("--json", options.is_json, "Print the script, or the completions, as one line of JSON");
+  app.footer("For bash: source <(rrgate completion bash)\n\n" + std::string(exit_codes));
 }
 
 }  // namespace rrgate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "node/generate/definition_set.hpp"
 #include "server/cli/command.hpp"
@@ -26,6 +27,18 @@ inline void add_folders(CLI::App& app, DefinitionOptions& options) {
 }
 inline CLI::Option* add_compat(CLI::App& app, DefinitionOptions& options) {
   return app.add_flag("--compat", options.is_compatible, "Accept what Robot Raconteur 1.x accepts beyond the standard");
+}
+
+/// One line of JSON on standard output.
+inline void print_json_diagnostic(const rr::Diagnostic& diagnostic) {
+  auto json = nlohmann::ordered_json::object();
+  json["file"] = diagnostic.file;
+  json["line"] = diagnostic.column != 0 ? diagnostic.column_line : diagnostic.line;
+  if (diagnostic.column != 0) json["column"] = diagnostic.column;
+  json["severity"] = diagnostic.severity == rr::Severity::error ? "error" : "warning";
+  json["code"] = diagnostic.code;
+  json["message"] = diagnostic.message;
+  print_json_line(json);
 }
 
 /// Prints all diagnostics to stderr; returns whether the definitions can be used.

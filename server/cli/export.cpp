@@ -20,12 +20,17 @@ struct ExportOptions {
   std::string member;
   std::string output;
   bool is_csv = false;
+  bool is_json = false;
 };
+
+/// What the member told: of an event its arguments.
+const rr::Json& value_of(const RecordedMember& member, const rr::Json& document) {
+  return member.kind == rr::MemberKind::event ? document : document["value"];
+}
 
 /// "/value/x" of {"value": {"x": 1}} is "/x", as `rrgate watch --csv` has it.
 rr::Json cells_of(const RecordedMember& member, const rr::Json& document) {
-  const auto& value = member.kind == rr::MemberKind::event ? document : document["value"];
-  const auto flat = value.flatten();
+  const auto flat = value_of(member, document).flatten();
   return flat.is_object() ? flat : rr::Json{{"", flat}};
 }
 
@@ -73,6 +78,19 @@ class CsvExport {
   std::set<std::string> known_;
 };
 
+/// A line for each message, as `rrgate watch --json` has it: {"time": ..., "value": ...}.
+rr::Result<> write_json_lines(Recording& recording, const RecordedMember& member, std::ostream& out) {
+  return recording.for_each(member, [&](const McapMessage& message) -> rr::Result<> {
+    const auto document = recording.read_document(message);
+    if (!document) return document.error();
+    auto line = rr::OrderedJson::object();
+    line["time"] = mcap_time_text(message.publish_time);
+    line["value"] = value_of(member, *document);
+    out << line.dump() << "\n";
+    return {};
+  });
+}
+
 std::string topics_of(const Recording& recording) {
   std::string out;
   for (const auto& [channel, member] : recording.members()) out += (out.empty() ? "" : ", ") + member.topic;
@@ -91,7 +109,7 @@ const RecordedMember* find_member(const Recording& recording, const std::string&
 }
 
 int run_export(const ExportOptions& options) {
-  if (!options.is_csv) return usage_error("export", "expected --csv");
+  if (!options.is_csv && !options.is_json) return usage_error("export", "expected --csv or --json");
   auto recording = Recording::open(options.file);
   if (!recording) return report_failure("export", recording.error().message);
   const auto* member = find_member(*recording, options.member);
@@ -103,8 +121,9 @@ int run_export(const ExportOptions& options) {
   std::ofstream file;
   if (!options.output.empty()) file.open(options.output, std::ios::binary | std::ios::trunc);
   auto& out = options.output.empty() ? std::cout : static_cast<std::ostream&>(file);
-  if (const auto written = CsvExport(*recording, *member).write(out); !written)
-    return report_failure("export", written.error().message);
+  const auto written =
+      options.is_json ? write_json_lines(*recording, *member, out) : CsvExport(*recording, *member).write(out);
+  if (!written) return report_failure("export", written.error().message);
   return out.flush() ? exit_ok : report_failure("export", options.output + ": can't be written");
 }
 
@@ -113,7 +132,8 @@ int run_export(const ExportOptions& options) {
 void add_export(Commands& commands) {
   const auto [app, options] = commands.add("export", "Write a member of a recording as a table", run_export);
   app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
-  app.add_flag("--csv", options.is_csv, "One line for each message, one column for each number");
+  auto* csv = app.add_flag("--csv", options.is_csv, "One line for each message, one column for each number");
+  app.add_flag("--json", options.is_json, "One line of JSON for each message")->excludes(csv);
   app.add_option("--member", options.member, "Member, as \"rrgate info FILE\" lists it: \"/Create/state\", \"state\"")
       ->option_text("MEMBER");
   app.add_option("-o", options.output, "File to write; default: standard output")->option_text("OUT");

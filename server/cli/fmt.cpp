@@ -10,6 +10,7 @@ namespace {
 struct FormatOptions : DefinitionOptions {
   bool in_place = false;
   bool is_check = false;
+  bool is_json = false;
 };
 
 int format(const FormatOptions& options) {
@@ -23,17 +24,34 @@ int format(const FormatOptions& options) {
     }
     const auto source = rr::parse_service_definition(*text, options.mode(), file);
     if (!source.ok()) {
-      for (const auto& diagnostic : source.diagnostics) std::cerr << rr::format_diagnostic(diagnostic) << "\n";
+      for (const auto& diagnostic : source.diagnostics) {
+        if (options.is_json)
+          print_json_diagnostic(diagnostic);
+        else
+          std::cerr << rr::format_diagnostic(diagnostic) << "\n";
+      }
       code = exit_failed;
     } else if (options.is_check) {
-      if (rr::format_source(source.definition) == *text) continue;
-      std::cout << file << "\n";
-      code = exit_failed;
+      const bool is_formatted = rr::format_source(source.definition) == *text;
+      if (options.is_json)
+        print_json_line({{"file", file}, {"formatted", is_formatted}});
+      else if (!is_formatted)
+        std::cout << file << "\n";
+      if (!is_formatted) code = exit_failed;
     } else if (!options.in_place) {
-      std::cout << rr::format_service_definition(source.definition);
-    } else if (!write_text_file(file, rr::format_source(source.definition))) {
-      std::cerr << file << ": error: cannot be written\n";
-      code = exit_failed;
+      const auto formatted = rr::format_service_definition(source.definition);
+      if (options.is_json)
+        print_json_line({{"file", file}, {"text", formatted}});
+      else
+        std::cout << formatted;
+    } else {
+      const auto formatted = rr::format_source(source.definition);
+      if (!write_text_file(file, formatted)) {
+        std::cerr << file << ": error: cannot be written\n";
+        code = exit_failed;
+      } else if (options.is_json) {
+        print_json_line({{"file", file}, {"changed", formatted != *text}});
+      }
     }
   }
   return code;
@@ -48,6 +66,7 @@ void add_fmt(Commands& commands) {
   auto* check = app.add_flag("--check", options.is_check, "List files with another format");
   app.add_flag("--in-place", options.in_place, "Write the files anew")->excludes(check)->excludes(compat);
   check->excludes(compat);
+  app.add_flag("--json", options.is_json, "Print each file, error and warning as one line of JSON");
 }
 
 }  // namespace rrgate

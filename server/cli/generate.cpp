@@ -23,24 +23,29 @@ DefinitionSet definitions_of_service(const std::string& url) {
   return DefinitionSet::from_texts(texts, rr::RobdefMode::compat);
 }
 
-int write_output(const std::string& file, const std::string& text) {
-  if (file.empty()) {
+int write_output(const std::string& file, const std::string& text, bool is_json) {
+  if (file.empty() && is_json) {
+    print_json_line({{"text", text}});
+  } else if (file.empty()) {
     std::cout << text;
   } else if (!write_text_file(file, text)) {
     std::cerr << file << ": error: cannot be written\n";
     return exit_failed;
+  } else if (is_json) {
+    print_json_line({{"file", file}});
   }
   return exit_ok;
 }
 
 struct GenerateOptions : DefinitionOptions {
   std::string output;
+  bool is_json = false;
 };
 
 int generate_ts(const GenerateOptions& options, const DefinitionSet& set) {
   const bool is_module = options.output.ends_with(".ts") && !options.output.ends_with(".d.ts");
-  return write_output(options.output, generate_typescript(set, is_module ? TypeScriptFlavour::module
-                                                                         : TypeScriptFlavour::declarations));
+  const auto flavour = is_module ? TypeScriptFlavour::module : TypeScriptFlavour::declarations;
+  return write_output(options.output, generate_typescript(set, flavour), options.is_json);
 }
 
 /// The files that were named, or all that the service has; a header and a source each.
@@ -50,8 +55,8 @@ int generate_cpp_files(const GenerateOptions& options, const DefinitionSet& set)
   std::filesystem::create_directories(folder, error);  // where it fails, writing does
   for (const auto* definition : set.requested()) {
     const auto files = generate_cpp(set, *definition);
-    if (write_output((folder / (files.name + ".hpp")).string(), files.header) != exit_ok ||
-        write_output((folder / (files.name + ".cpp")).string(), files.source) != exit_ok)
+    if (write_output((folder / (files.name + ".hpp")).string(), files.header, options.is_json) != exit_ok ||
+        write_output((folder / (files.name + ".cpp")).string(), files.source, options.is_json) != exit_ok)
       return exit_failed;
   }
   return exit_ok;
@@ -77,6 +82,7 @@ void add_generator(const NewCommand<GenerateOptions>& command, const std::string
       ->required()
       ->option_text("... or URL");
   command.app.add_option("-o", command.values.output, output)->option_text("OUT");
+  command.app.add_flag("--json", command.values.is_json, "Print each file that is written as one line of JSON");
   add_folders(command.app, command.values);
   add_compat(command.app, command.values);
 }

@@ -80,7 +80,49 @@ class TakeBack {
 struct InitOptions {
   std::string folder{service_folder};
   std::string user = "admin";
+  bool is_json = false;
 };
+
+/// What a run has made.
+struct Made {
+  fs::path folder;
+  CertificateFiles authorities;
+  CertificateFiles certificate;  ///< of the web server
+  std::vector<std::string> names;
+  std::string user;
+  std::string password;
+
+  fs::path config() const { return folder / "gateway.json"; }
+  fs::path users() const { return folder / "users"; }
+  std::string url() const { return "https://" + names.front() + ":8443/"; }
+  fs::path web_ca() const { return folder / tls_folder_name / "web-ca.pem"; }
+};
+
+void print_json(const Made& made) {
+  auto files = nlohmann::ordered_json::array();
+  for (const auto* each : {&made.authorities, &made.certificate})
+    for (const auto& file : *each) files.push_back(file.string());
+  for (const auto& file : {made.users(), made.folder / ticket_key_name, made.config()}) files.push_back(file.string());
+  print_json_line({{"config", made.config().string()},
+                   {"files", files},
+                   {"user", made.user},
+                   {"password", made.password},
+                   {"names", made.names},
+                   {"url", made.url()},
+                   {"web_ca", made.web_ca().string()}});
+}
+
+void print_text(const Made& made) {
+  print_authorities(made.authorities);
+  print_web_certificate(made.certificate);
+  const auto file = made.config().string();
+  std::cout << file << "\n\nuser " << made.user << ", password " << made.password << " (shown this once; rrgate passwd "
+            << made.users().string() << " " << made.user << " sets another)\n"
+            << made.url() << " once it runs; browsers believe it with " << made.web_ca().string()
+            << "\nNext: put your devices into " << file << ", then "
+            << (made.folder == service_folder ? "systemctl enable --now rrgate" : "rrgate serve --config " + file)
+            << "\n";
+}
 
 int init(const InitOptions& options) {
   const fs::path folder = options.folder;
@@ -95,12 +137,14 @@ int init(const InitOptions& options) {
     if (fs::exists(each, error))
       return report_failure("init", each.string() + ": is there already; nothing was written");
   }
-  TakeBack made(files_beside(folder));
+  TakeBack unfinished(files_beside(folder));
 
   const auto names = names_of_machine();
   const auto tls_folder = folder / tls_folder_name;
-  if (make_authorities({.folder = tls_folder, .days = 3650}) != exit_ok) return exit_failed;
-  if (make_web_certificate({{.folder = tls_folder}, names}) != exit_ok) return exit_failed;
+  const auto authorities = make_authorities({.folder = tls_folder, .days = 3650});
+  if (!authorities) return report_failure("init", authorities.error().message);
+  const auto certificate = make_web_certificate({{.folder = tls_folder}, names});
+  if (!certificate) return report_failure("init", certificate.error().message);
 
   const auto password = write_first_user(folder / "users", user);
   if (!password) return report_failure("init", password.error().message);
@@ -110,14 +154,10 @@ int init(const InitOptions& options) {
   const auto config = make_config(folder, names.front()).dump(2) + "\n";
   if (const auto done = rr::write_secret(file, config, true, rr::SecretReaders::folder_group); !done)
     return report_failure("init", done.error().message);
-  made.keep_all();
+  unfinished.keep_all();
 
-  std::cout << file.string() << "\n\nuser " << user << ", password " << *password << " (shown this once; rrgate passwd "
-            << (folder / "users").string() << " " << user << " sets another)\nhttps://" << names.front()
-            << ":8443/ once it runs; browsers believe it with " << (tls_folder / "web-ca.pem").string()
-            << "\nNext: put your devices into " << file.string() << ", then "
-            << (folder == service_folder ? "systemctl enable --now rrgate" : "rrgate serve --config " + file.string())
-            << "\n";
+  const Made made{folder, *authorities, *certificate, names, user, *password};
+  options.is_json ? print_json(made) : print_text(made);
   return exit_ok;
 }
 
@@ -129,6 +169,7 @@ void add_init(Commands& commands) {
       ->capture_default_str()
       ->option_text("[/etc/rrgate]");
   app.add_option("--user", options.user, "Name of the first user")->capture_default_str()->option_text("NAME [admin]");
+  app.add_flag("--json", options.is_json, "Print what was made, with the password, as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/support/words.hpp"
@@ -89,10 +90,11 @@ struct PasswordOptions {
   std::string name;
   std::optional<std::string> roles;
   bool deletes = false;
+  bool is_json = false;
 };
 
 int set_password(const PasswordOptions& options) {
-  const auto& [file, name, roles, deletes] = options;
+  const auto& [file, name, roles, deletes, is_json] = options;
   if (auto checked = check_name("user name", name); !checked) return usage_error("passwd", checked.error().message);
 
   std::error_code error;
@@ -111,11 +113,11 @@ int set_password(const PasswordOptions& options) {
   }
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("passwd", done.error().message);
-  std::cout << file << ": user " << rr::quote(name)
-            << (deletes          ? " is deleted"
-                : before.empty() ? " is added"
-                                 : " is changed")
-            << "\n";
+  const std::string change = deletes ? "deleted" : before.empty() ? "added" : "changed";
+  if (is_json)
+    print_json_line({{"file", file}, {"user", name}, {"change", change}});
+  else
+    std::cout << file << ": user " << rr::quote(name) << " is " << change << "\n";
   return exit_ok;
 }
 
@@ -129,6 +131,7 @@ void add_passwd(Commands& commands) {
   app.add_option("--roles", options.roles, "Roles, or _ for none; default: unchanged")
       ->option_text("A,B")
       ->excludes(deletes);
+  app.add_flag("--json", options.is_json, "Print what was changed as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -9,6 +9,7 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 
@@ -176,7 +177,14 @@ int run_record(const RecordOptions& options) {
       if (writer->message_count() == 0) std::filesystem::remove(options.output, error);
       throw;
     }
-    std::cerr << summary(*writer, run.seconds()) << "\n";
+    if (options.is_json)
+      print_json_line({{"file", options.output},
+                       {"messages", writer->message_count()},
+                       {"members", writer->topics().size()},
+                       {"seconds", run.seconds()},
+                       {"bytes", writer->size()}});
+    else
+      std::cerr << summary(*writer, run.seconds()) << "\n";
   });
 }
 
@@ -212,6 +220,7 @@ void add_record(Commands& commands) {
   add_positive(app, "--max-size", options.max_size, "Size at which the next file begins: FILE-2, FILE-3, ...", "MB");
   add_count(app, "--keep", options.kept_files, "Number of files to keep; older ones are deleted")->needs("--max-size");
   app.add_flag("--force", options.replaces, "Overwrite existing files");
+  app.add_flag("--json", options.is_json, "Print what was recorded as one line of JSON");
   add_connection_options(app, options);
 }
 

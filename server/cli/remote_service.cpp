@@ -74,6 +74,9 @@ CLI::Option* add_url(CLI::App& app, RemoteOptions& options) {
 }
 
 void add_connection_options(CLI::App& app, RemoteOptions& options) {
+  app.footer(
+      "Exit codes: 0 done; 1 failed; 2 wrong options, URL, member or arguments; 3 not reached, lost or no answer in "
+      "time; 4 refused; 5 error of the device");
   app.add_option("--user", options.user, "Log in, with the password of $RRGATE_PASSWORD")->option_text("NAME");
   app.add_option("--timeout", options.timeout, "Limit for connecting and for each request")
       ->check([](const std::string& text) {

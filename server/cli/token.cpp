@@ -1,5 +1,6 @@
 // rrgate token: API tokens, in the file that "tokens_file" names. Layer: server/cli.
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
@@ -17,6 +18,7 @@ struct TokenOptions {
   std::string roles;
   int days = 0;
   bool deletes = false;
+  bool is_json = false;
 };
 
 /// "_" for ever.
@@ -26,7 +28,7 @@ std::string last_day(int days) {
 }
 
 int make_token(const TokenOptions& options) {
-  const auto& [file, name, role_names, days, deletes] = options;
+  const auto& [file, name, role_names, days, deletes, is_json] = options;
   if (auto checked = check_name("token name", name); !checked) return usage_error("token", checked.error().message);
   const auto roles = parse_roles(role_names);
   if (!roles) return usage_error("token", "--roles: " + roles.error().message);
@@ -46,6 +48,12 @@ int make_token(const TokenOptions& options) {
       deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + last_day(days);
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("token", done.error().message);
+  if (is_json) {
+    nlohmann::ordered_json made{{"file", file}, {"name", name}, {"change", deletes ? "deleted" : "added"}};
+    if (!deletes) made["token"] = token;
+    print_json_line(made);
+    return exit_ok;
+  }
   if (deletes) {
     std::cout << file << ": token " << rr::quote(name) << " is deleted\n";
     return exit_ok;
@@ -67,6 +75,7 @@ void add_token(Commands& commands) {
       ->check(CLI::Range(1, 36500))
       ->option_text("N")
       ->excludes(deletes);
+  app.add_flag("--json", options.is_json, "Print what was changed, with the token, as one line of JSON");
 }
 
 }  // namespace rrgate

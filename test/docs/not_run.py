@@ -8,6 +8,7 @@ COMMANDS = {
     ("docs/deploy.md", "apt install"): "installs a package: test/interop/test_package.py does",
     ("docs/deploy.md", "adduser"): "makes a user of this machine",
     ("docs/deploy.md", "docker build"): "takes a container engine: test/interop/test_container.py does it",
+    ("docs/deploy.md", "./dev package image"): "the same",
     ("docs/device-author.md", "build-examples/web_server"): "test/interop/test_web_server.py runs it",
     ("docs/discovery.md", "install -d"): "makes folders of this machine's users: test/interop/test_local_discovery.py does it",
     ("docs/embedding.md", "build-examples/thermostat_gateway"): "test/examples/examples_test.py builds and runs it",

@@ -4,6 +4,7 @@ import html.parser
 import http.client
 import json
 import re
+import subprocess
 import urllib.parse
 
 import pytest
@@ -42,6 +43,17 @@ def site():
 def test_nothing_stands_inside_of_a_page_and_nothing_comes_from_elsewhere(site):
     assert [(name, page.inside) for name, page in site.items() if page.inside] == []
     assert [(name, load) for name, page in site.items() for load in page.loads if not load.startswith("/docs/")] == []
+
+
+def test_all_commands_have_a_place_in_the_reference(site):
+    def commands_below(*words):
+        text = subprocess.run([BUILD / "server" / "rrgate", *words, "--help"], capture_output=True, text=True, timeout=20, check=True).stdout
+        names = re.findall(r"^  ([a-z][a-z-]+)  +[A-Z]", text, re.M)
+        return [place for name in names for place in ["-".join(["rrgate", *words, name]), *commands_below(*words, name)]]
+
+    places = commands_below()
+    assert {"rrgate-ls", "rrgate-cert-ca", "rrgate-generate-ts"} <= set(places)
+    assert set(places) <= site["reference/commands.html"].ids
 
 
 def test_links_lead_to_pages_and_headings(site):

@@ -2,7 +2,9 @@
 without."""
 import datetime
 import getpass
+import itertools
 import json
+import math
 import os
 import pathlib
 import re
@@ -207,6 +209,24 @@ def test_requests_are_timed(url):
     assert times["count"] == 20
     assert 0 < times["min_ms"] <= times["p50_ms"] <= times["p99_ms"] <= times["max_ms"]
     assert run("ping", url, "--count", "20").startswith("20 requests: min ")
+
+
+def test_the_times_of_requests_are_counted_by_class(slow_reynard):
+    """Each request passes a line that takes 10 ms each way, so none is in a class that ends below 16 ms."""
+    for command in (["ping"], ["bench", "--parallel", "1"]):
+        summary, *classes = run(command[0], slow_reynard, *command[1:], "--count", "30").splitlines()
+        at = dict(zip(("min", "p50", "p99", "max"), map(float, re.fullmatch(
+            r"30 requests: min (\S+) ms, p50 (\S+) ms, p99 (\S+) ms, max (\S+) ms", summary).groups())))
+        if command[0] == "bench":
+            rate = int(re.fullmatch(r"(\d+) /s", classes.pop(0))[1])
+            assert 0 < rate <= 1000 / at["min"] + 1
+        rows = [re.fullmatch(r" *(\d+\.\d{3}) ms +(\d+) (#+)", row).groups() for row in classes]
+        limits, counts, bars = [float(row[0]) for row in rows], [int(row[1]) for row in rows], [len(row[2]) for row in rows]
+        assert sum(counts) == 30 and all(counts)
+        assert all(16 <= limit == 2 ** round(math.log2(limit)) for limit in limits) and limits == sorted(set(limits))
+        assert limits[0] / 2 < at["min"] <= limits[0] and limits[-1] / 2 < at["max"] <= limits[-1]
+        assert next(limit for limit, below in zip(limits, itertools.accumulate(counts)) if below > 14) / 2 < at["p50"]
+        assert bars == [math.ceil(50 * count / 30) for count in counts]
 
 
 def test_many_requests_are_timed_side_by_side(url):

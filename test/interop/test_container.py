@@ -1,4 +1,5 @@
-"""The container image: built by podman from programs that were compiled already, run as it is meant to be run."""
+"""The container image: built by podman from programs that were compiled already, and made of the Debian package by `./dev package
+image`; both are run as they are meant to be run."""
 import base64
 import ipaddress
 import json
@@ -6,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import time
 
 import jsonschema_rs
@@ -19,7 +21,9 @@ from processes import BUILD, ROOT, START_DEADLINE, free_port
 from reverse_proxies import UNPACKED
 
 DOCKER = ROOT / "docker"
-BASE = ROOT / "build" / "deps" / "container-base.tar"  # ./dev test made it; where it can't, images can't be built
+DEPS = ROOT / "build" / "deps"
+BASE = DEPS / "container-base.tar"  # ./dev test made it; where it can't, images can't be built
+PACKAGES = ROOT / "build" / "package"
 LARGEST = 90 * 1024 * 1024
 
 STORAGE = """[storage]
@@ -78,8 +82,26 @@ def podman(tmp_path_factory):
     shutil.rmtree(folder, ignore_errors=True)
 
 
+@pytest.fixture(scope="module", params=["built", "packaged"])
+def image(request, podman, tmp_path_factory):
+    return request.getfixturevalue(request.param)
+
+
 @pytest.fixture(scope="module")
-def image(podman, tmp_path_factory):
+def packaged(podman, tmp_path_factory):
+    """Of the package that ./dev test made, in the archive that is given to `docker load`."""
+    need("image-debs")
+    (deb,) = PACKAGES.glob("rrgate_*_amd64.deb")
+    archive = tmp_path_factory.mktemp("archive") / "image.tar"
+    subprocess.run([sys.executable, "-B", ROOT / "cmake/make_image.py", "--package", deb, "--debian", DEPS / "image-debs-amd64",
+                    "--dockerfile", DOCKER / "Dockerfile", "--config", DOCKER / "gateway.json", "--output", archive],
+                   check=True, timeout=120, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"})
+    said = podman("load", "-i", archive)
+    return re.search(r"Loaded image: (\S+/rrgate:\S+)", said)[1]
+
+
+@pytest.fixture(scope="module")
+def built(podman, tmp_path_factory):
     podman("import", BASE, "docker.io/library/debian:bookworm-slim")
     context = tmp_path_factory.mktemp("context")
     shutil.copytree(DOCKER, context / "docker", ignore=shutil.ignore_patterns("prebuilt"))

@@ -259,6 +259,23 @@ def test_a_member_is_exported_as_a_table(of_create, tmp_path):
     assert "no one member 'nonesuch'" in rrgate("export", of_create, "--csv", "--member", "nonesuch", code=2)
 
 
+def test_a_member_is_exported_as_json(of_create, tmp_path):
+    states = [document["value"] for name, _, document in messages(of_create) if name == "/Create/state"]
+    rows = [json.loads(line) for line in rrgate("export", of_create, "--json", "--member", "state").splitlines()]
+    table = csv.reader(io.StringIO(rrgate("export", of_create, "--csv", "--member", "state")))
+    assert [row["value"] for row in rows] == states
+    assert [row["time"] for row in rows] == [row[0] for row in table][1:]
+    assert "excludes" in rrgate("export", of_create, "--csv", "--json", "--member", "state", code=2)
+    assert "expected --csv or --json" in rrgate("export", of_create, "--member", "state", code=2)
+
+
+def test_what_was_recorded_is_told_as_json(create, tmp_path):
+    path = tmp_path / "short.mcap"
+    told = json.loads(rrgate("record", create, "-o", path, "--members", "state", "--duration", "0.5", "--json"))
+    assert told["file"] == str(path) and told["messages"] == len(messages(path)) > 0
+    assert told["members"] == 1 and told["seconds"] >= 0.5 and told["bytes"] == path.stat().st_size
+
+
 def test_a_long_recording_goes_on_in_further_files_and_the_oldest_go(create, tmp_path):
     rrgate("record", create, "-o", tmp_path / "run.mcap", "--members", "state", "--duration", "3", "--max-size", "0.008", "--keep", "2")
     files = sorted(tmp_path.glob("run*.mcap"))

@@ -16,7 +16,9 @@ import pytest
 
 from command_line import DEVICE_ERROR, Ran, run, shown_on_terminal
 from gateways import RRGATE
-from processes import ROOT, Background, free_port
+from network import Network
+from processes import ROOT, START_DEADLINE, Background, free_port
+from qr_codes import modules_on_terminal, read_text
 
 
 def test_text_of_a_device_does_not_command_the_terminal(tmp_path):
@@ -146,6 +148,39 @@ def test_the_demo_opens_a_browser_on_a_desktop(more, desktop, opens, tmp_path):
             demo.wait()
             os.close(terminal)
     assert (tmp_path / "opened").exists() == opens  # it would have been opened before the demo ended
+
+
+def shown_by_demo(host, network, *more, on_terminal):
+    """What `rrgate demo --lan` prints until its own address, which comes last."""
+    terminal, theirs = pty.openpty() if on_terminal else os.pipe()
+    command = network.on(host, str(RRGATE), "demo", "webcams", "--port", "0", "--lan", *more)
+    with subprocess.Popen(command, stdout=theirs, stderr=subprocess.DEVNULL) as demo:
+        os.close(theirs)
+        try:
+            shown, deadline = b"", time.monotonic() + START_DEADLINE
+            while not re.search(rb"rrgate demo: http://127\S+\s", shown):
+                assert select.select([terminal], [], [], max(0, deadline - time.monotonic()))[0], shown
+                shown += os.read(terminal, 4096)
+        finally:
+            demo.terminate()
+            demo.wait()
+            os.close(terminal)
+    return shown.decode().splitlines()
+
+
+def test_a_phone_reads_the_address_of_the_demo():
+    network = Network(1)
+    try:
+        lines = shown_by_demo(0, network, on_terminal=True)
+        (url,) = [line.split()[-1] for line in lines if line.startswith("rrgate demo: on the network ")]
+        assert re.fullmatch(r"http://10\.77\.0\.1:\d+/", url)
+        code = [line for line in lines if "\x1b" in line]  # the devices speak, too
+        assert read_text(modules_on_terminal(code, "\x1b[30;107m", "\x1b[0m")) == url
+        lines = shown_by_demo(0, network, on_terminal=False)  # a file or a pipe gets words alone
+        assert len([line for line in lines if line.startswith("rrgate demo: ")]) == 3, lines
+        assert "\x1b" not in "".join(lines)
+    finally:
+        network.close()
 
 
 def test_the_script_lists_demos_as_the_program_does():
