@@ -256,7 +256,7 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
     const auto begun = gateway_.access().begin(
         identity, {command.wanted.device, command.wanted.service, command.wanted.path, {}, Verb::lock}, trace, "lease");
     client = co_await hold_lease(gateway_, std::move(asker), std::move(identity), std::move(path),
-                                 rr::LockCommand::acquire_lease, agent_deadman);
+                                 rr::LockCommand::acquire_lease, agent_deadman, LeaseNeeds::nothing);
     if (begun) begun->finish({});
     lease.emplace(client, target.path(), reply_.waker());
   }

@@ -83,7 +83,7 @@ AuditEntryPtr ValueClient::begin_lease_end(const std::string& path) const {
 }
 
 bool ValueClient::may_hold(const std::string& path) const {
-  return !standing_ || standing_->check(to_lock(path), Recorded::never).has_value();
+  return !needs_right_ || standing_->check(to_lock(path), Recorded::never).has_value();
 }
 
 rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string path,

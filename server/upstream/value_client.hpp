@@ -84,8 +84,11 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void on_lease_ended(std::function<void(const std::string& path, const std::string& why)> handler) {
     on_lease_ended_ = std::move(handler);
   }
-  /// Who it is, for what leases need of that.
-  void set_standing(StandingPtr standing) { standing_ = std::move(standing); }
+  /// Who it is, for what leases need of that. `needs_right`  whether its leases end when it may not lock any more.
+  void set_standing(StandingPtr standing, bool needs_right = true) {
+    standing_ = std::move(standing);
+    needs_right_ = needs_right;
+  }
 
   /// Calls a handler with what a member brings, until it is destroyed.
   class Listener {
@@ -179,6 +182,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   Subject user_;
   std::function<void(const std::string&, const std::string&)> on_lease_ended_;
   StandingPtr standing_;  ///< null: of nobody in particular
+  bool needs_right_ = false;
   Device::Seat seat_;
   MemoryBudget::Charge memory_;
   std::map<Key, Topic> topics_;

@@ -33,7 +33,8 @@ rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& t
   auto asker = target.client;
   auto who = request.request().identity;
   auto path = target.path();
-  const auto holder = co_await hold_lease(gateway, std::move(asker), std::move(who), std::move(path), command, deadman);
+  const auto holder = co_await hold_lease(gateway, std::move(asker), std::move(who), std::move(path), command, deadman,
+                                          LeaseNeeds::right_to_lock);
   auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
   gateway.lease_holders().emplace(key, holder);
   holder->on_lease_ended([&gateway, key, executor = holder->upstream()->device().executor()](const auto&, const auto&) {
@@ -46,11 +47,12 @@ rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& t
 
 rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, std::shared_ptr<ValueClient> asker,
                                                        Identity who, std::string path, rr::LockCommand command,
-                                                       milliseconds deadman) {
+                                                       milliseconds deadman, LeaseNeeds needs) {
   const UpstreamClient& shared = *asker;
   const auto user = who.is_proven() ? who.subject() : shared.lock_user();
   const auto holder = value_or_throw(gateway.clients().make_another(asker->upstream(), user));
-  holder->set_standing(std::make_shared<Standing>(gateway.access(), std::move(who)));
+  holder->set_standing(std::make_shared<Standing>(gateway.access(), std::move(who)),
+                       needs == LeaseNeeds::right_to_lock);
   co_await holder->lock(command, std::move(path), deadman);
   co_return holder;
 }

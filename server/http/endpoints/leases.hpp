@@ -1,6 +1,7 @@
 // Leases for clients of HTTP: POST .../OBJECT?lease=acquire. Layer: server/http/endpoints. See docs/leases.md.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -16,11 +17,14 @@ inline constexpr std::string_view lease_header = "Rrgate-Lease";
 std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target);
 /// Whether the request releases a lease that its client has: that takes no right.
 bool releases_own_lease(const ObjectRequest& request, const Target& target);
+/// Whose right a lease needs to last: whoever has taken it must have the right to lock; or, where the gateway holds it
+/// for a command, the gateway looks itself whether that may go on.
+enum class LeaseNeeds : std::uint8_t { right_to_lock, nothing };
 /// One more client of the session that `asker` uses: it holds the lease of an object until it is gone, or the lease
 /// ends. Throws   rr::Exception.
 rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, std::shared_ptr<ValueClient> asker,
                                                        Identity who, std::string path, rr::LockCommand command,
-                                                       milliseconds deadman);
+                                                       milliseconds deadman, LeaseNeeds needs);
 /// Throws   rr::Exception.
 rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target);
 
