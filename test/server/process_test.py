@@ -74,14 +74,6 @@ class CommandLine(Files):
         result = run("check-config", self.file({"listen": ["127.0.0.1:1"], "devices": []}))
         self.assertEqual((result.returncode, result.stderr), (0, ""))
 
-    def test_commands_that_have_an_answer_give_it_as_json(self):
-        """What others print is a file, a protocol, or one word on a line."""
-        commands = re.findall(r"^  ([a-z][a-z-]+)  +[A-Z]", run("--help").stdout, re.M)
-        self.assertGreater(len(commands), 20)
-        without = [name for name in commands if "--json " not in run(name, "--help").stdout]
-        self.assertEqual(without, ["serve", "init", "passwd", "token", "cert", "record", "export", "mcp", "fmt", "generate",
-                                   "completion"])
-
     def test_a_configuration_is_judged_as_json(self):
         good, bad = {"listen": ["127.0.0.1:1"], "devices": []}, {"listen": ["8080"], "devices": []}
         for config, code in ((good, 0), (bad, 2)):
