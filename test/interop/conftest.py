@@ -3,7 +3,6 @@ import json
 import os
 import shutil
 import socket
-import subprocess
 import sys
 import tempfile
 
@@ -181,9 +180,14 @@ def reynard(tmp_path_factory):
 
     device.wait_until(is_listening)
     url = f"rr+tcp://127.0.0.1:{port}/?service=reynard"
-    # The reference makes an object for the first client that asks; for two at the same moment it makes it twice, and fails.
-    subprocess.run([RRGATE, "info", url], check=True, stdout=subprocess.DEVNULL)
+    # The reference makes an object for the first client that asks; for two at the same moment it makes it twice, and fails. So
+    # there is a first one, and it stays.
+    values = log.with_name("values")
+    values.touch()
+    first = Background(["sh", "-c", f"exec {RRGATE} watch '{url}' state --csv >{values}"], log.with_name("first"))
+    first.wait_until(lambda: values.stat().st_size)
     yield url
+    first.stop()
     device.stop()
 
 

@@ -232,8 +232,9 @@ def test_who_drives_is_asked_for_a_song(language, tmp_path):
         done = run_program([BUILD / "test/interop/cpp/rr-test-client", service.next_line()], [
             {"answer": "play_callback", "value": {"uint8[]": [69, 16, 60, 16, 69]}},
             {"call": "Drive", "args": [{"int16": 100}, {"int16": 1000}]},
-            {"asked": "play_callback", "count": 1}])
-        assert done["results"][-1]["value"] == {"list": [[0, 0]]}
+            {"asked": "play_callback", "count": 1},
+            {"call": "Drive", "args": [{"int16": 0}, {"int16": 0}]}])  # it does not leave before its answer is heard
+        assert done["results"][-2]["value"] == {"list": [[0, 0]]}
         wait_for(lambda: [141, 0] in robot.commands)
         assert [command for command in robot.commands if command[0] in (140, 141)] == [[140, 0, 2, 69, 16, 60, 16], [141, 0]]
     finally:
