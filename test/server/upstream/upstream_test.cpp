@@ -490,76 +490,67 @@ TEST_CASE("a client that has left asks the device for nothing") {
   CHECK(device.commands.empty());
 }
 
-TEST_CASE("no lease is given above an object that another client has locked") {
+/// Two clients of a device with an object below its root, and leases.
+struct LockBench {
   Counting device;
-  const auto part = device.service->make_object("Part");
-  part->allow_monitor();
-  device.service->root().objref("parts", [&](std::string_view) { return part; });
-  LeaseConfig leases;
-  leases.is_offered = true;
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  REQUIRE(bench.find("bench.parts[1]").has_value());
-  HearingClient first(bench.upstream);
-  HearingClient second(bench.upstream);
+  std::shared_ptr<rr::Object> part = device.service->make_object("Part");
+  UpstreamBench bench;
+  HearingClient first;
+  HearingClient second;
   rr::LockRequestId last = 0;
-  const auto ask = [&](HearingClient& client, rr::LockCommand command, const std::string& path) {
-    std::optional<rr::ErrorCode> answer;
-    rr::LockWanted wanted;
-    wanted.id = ++last;
-    wanted.command = command;
-    wanted.path = path;
-    wanted.timeout = 1000ms;
-    bench.upstream->lock(client, wanted, [&](const rr::Result<>& result) {
-      answer = result ? rr::ErrorCode::none : result.error().code;
-    });
-    REQUIRE(bench.run_until([&] { return answer.has_value(); }));
-    return *answer;
-  };
-  CHECK(ask(first, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
-  CHECK(ask(second, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::object_locked_error);
-  CHECK(ask(first, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
-}
 
-TEST_CASE("who waits for a monitor gets none below a lease that its holder has taken meanwhile") {
-  Counting device;
-  const auto part = device.service->make_object("Part");
-  part->allow_monitor();
-  device.service->root().objref("parts", [&](std::string_view) { return part; });
-  LeaseConfig leases;
-  leases.is_offered = true;
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  REQUIRE(bench.find("bench.parts[1]").has_value());
-  HearingClient holder(bench.upstream);
-  HearingClient waiter(bench.upstream);
-  rr::LockRequestId last = 0;
-  const auto begin = [&](HearingClient& client, rr::LockCommand command, const std::string& path) {
+  LockBench() : bench(with_part(), {.is_offered = true}), first(bench.upstream), second(bench.upstream) {
+    bench.open();
+    REQUIRE(bench.find("bench.parts[1]").has_value());
+  }
+
+  std::shared_ptr<rr::Service> with_part() {
+    part->allow_monitor();
+    device.service->root().objref("parts", [this](std::string_view) { return part; });
+    return device.service;
+  }
+
+  /// The answer, once it is there.
+  auto begin(HearingClient& client, rr::LockCommand command, const std::string& path) {
     rr::LockWanted wanted;
     wanted.id = ++last;
     wanted.command = command;
     wanted.path = path;
     wanted.timeout = 10s;
-    const auto out = std::make_shared<std::optional<rr::ErrorCode>>();
-    bench.upstream->lock(client, wanted, [out](const rr::Result<>& result) {
-      *out = result ? rr::ErrorCode::none : result.error().code;
+    const auto answer = std::make_shared<std::optional<rr::ErrorCode>>();
+    bench.upstream->lock(client, wanted, [answer](const rr::Result<>& result) {
+      *answer = result ? rr::ErrorCode::none : result.error().code;
     });
-    return out;
-  };
-  const auto ask = [&](HearingClient& client, rr::LockCommand command, const std::string& path) {
+    return answer;
+  }
+
+  rr::ErrorCode ask(HearingClient& client, rr::LockCommand command, const std::string& path) {
     const auto answer = begin(client, command, path);
     REQUIRE(bench.run_until([&] { return answer->has_value(); }));
     return **answer;
-  };
-  CHECK(ask(holder, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
-  const auto waiting = begin(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]");
-  CHECK(ask(holder, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
-  CHECK(ask(holder, rr::LockCommand::exit_monitor, "bench.parts[1]") == rr::ErrorCode::none);
-  REQUIRE(bench.run_until([&] { return waiting->has_value(); }));
+  }
+};
+
+TEST_CASE("no lease is given above an object that another client has locked") {
+  LockBench locks;
+  CHECK(locks.ask(locks.first, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  CHECK(locks.ask(locks.second, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::object_locked_error);
+  CHECK(locks.ask(locks.first, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
+}
+
+TEST_CASE("who waits for a monitor gets none below a lease that its holder has taken meanwhile") {
+  LockBench locks;
+  auto& holder = locks.first;
+  auto& waiter = locks.second;
+  CHECK(locks.ask(holder, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  const auto waiting = locks.begin(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]");
+  CHECK(locks.ask(holder, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
+  CHECK(locks.ask(holder, rr::LockCommand::exit_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  REQUIRE(locks.bench.run_until([&] { return waiting->has_value(); }));
   CHECK(**waiting == rr::ErrorCode::object_locked_error);
-  CHECK(ask(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::object_locked_error);
-  CHECK(ask(holder, rr::LockCommand::release_lease, "bench") == rr::ErrorCode::none);
-  CHECK(ask(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  CHECK(locks.ask(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::object_locked_error);
+  CHECK(locks.ask(holder, rr::LockCommand::release_lease, "bench") == rr::ErrorCode::none);
+  CHECK(locks.ask(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
 }
 
 TEST_CASE("a session that rests is ended behind the answer of what makes the device safe") {
