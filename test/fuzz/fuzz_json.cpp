@@ -30,7 +30,6 @@ std::string written(const Value& value, const TypeDefinition& type, const JsonFo
 /// The first byte chooses a type, the second the forms; then comes JSON, or CBOR, whose first bytes may be repeated:
 /// what nests without end is too long for an input.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const rr::fuzz::MemoryBound bound(size);
   if (size < 3) return 0;
   const auto& types = test::test_types();
   static const auto& fields = types.find_entity("test.types.every")->members;
@@ -46,6 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     repeated.insert(repeated.end(), body.begin(), body.end());
     body = repeated;
   }
+  const rr::fuzz::MemoryBound bound(body.size());
   const auto json = data[1] & 8 ? read_cbor(body) : read_json(as_text(body));
   if (!json) {
     require(!json.error().message.empty(), "an error says what", "");
