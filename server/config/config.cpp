@@ -178,6 +178,17 @@ void check_whole(const Config& config, const nlohmann::json& document, std::vect
   check_access(config, findings);
 }
 
+/// A sentence of nlohmann, with the end alone of the token that it shows: a comment before it is part of the token.
+std::string with_short_token(std::string what) {
+  constexpr std::string_view token = "last read: '";
+  constexpr std::size_t longest_end = 120;
+  const auto begin = what.find(token);
+  if (begin == std::string::npos || what.size() - begin <= token.size() + longest_end) return what;
+  auto end = what.size() - longest_end;
+  while ((static_cast<unsigned char>(what[end]) & 0xc0) == 0x80) ++end;  // within a character of UTF-8
+  return what.replace(begin + token.size(), end - begin - token.size(), "...");
+}
+
 /// Parses JSON with comments. nlohmann keeps the last of two equal keys; here that is a finding.
 std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Finding>& findings) {
   std::vector<std::set<std::string>> seen;
@@ -192,8 +203,8 @@ std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Find
     return nlohmann::json::parse(text, watch, true, true);
   } catch (const nlohmann::json::exception& error) {  // a number that no double holds is no parse_error
     std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
-    const auto begin = what.find("] ");
-    findings.push_back({{}, "not JSON: " + (begin == std::string::npos ? what : what.substr(begin + 2))});
+    what.erase(0, what.find("] ") + 2);
+    findings.push_back({{}, "not JSON: " + with_short_token(std::move(what))});
     return std::nullopt;
   }
 }

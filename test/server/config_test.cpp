@@ -355,6 +355,14 @@ TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds("", "gateway.json: not JSON");
   finds("{", "gateway.json: not JSON", "line 1");
   finds(R"({"listen": 1e400})", "gateway.json: not JSON", "1e400");
+  for (std::size_t after = 60; after < 110; ++after) {  // the token of an error has the comment before it
+    const auto comment = "// " + std::string(3000, 'x') + "\xc3\xa4" + std::string(after, 'y') + "\n";
+    const auto found = parse_config(comment + "{l").findings;
+    REQUIRE(found.size() == 1);
+    CHECK(found[0].text.size() < 300);
+    CHECK_THAT(found[0].text, Catch::Contains("line 2, column 2") && Catch::Contains("...") && Catch::Contains("{l"));
+    CHECK_NOTHROW(nlohmann::json(found[0].text).dump());  // no half of a character
+  }
   finds("[]", "gateway.json: ", "found array, expected an object");
   finds(R"({"devices": []})", "gateway.json: /listen: missing; expected an array");
   finds(R"({"listen": ["127.0.0.1:0"]})", "gateway.json: /devices: missing");
