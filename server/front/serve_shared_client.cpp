@@ -70,12 +70,15 @@ struct SharedPass : rr::RequestPass {
   AuditEntryPtr entry;
 };
 
-/// An emergency stop, and the like: it passes where others are refused because there were too many.
+/// An emergency stop, and the like, or the end of a lease: it passes where others are refused because there were too
+/// many.
 bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
   const bool is_command = wanted.type == rr::EntryType::function_call_req ||
                           wanted.type == rr::EntryType::property_set_req ||
                           wanted.type == rr::EntryType::wire_poke_out_value_req;
-  const auto* device = is_command && wanted.member ? gateway.devices().find(device_name) : nullptr;
+  if (!is_command || !wanted.member) return false;
+  if (device_name == gateway_device) return wanted.member->name == "release_lease";
+  const auto* device = gateway.devices().find(device_name);
   return device && device->config().leases.is_urgent(std::string(wanted.path) + "." + wanted.member->name);
 }
 

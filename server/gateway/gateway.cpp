@@ -264,7 +264,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
 
 void Gateway::end_those_not_good() {
   for (const auto& [key, holder] : lease_holders_)
-    holder->review_locks();  // others are reviewed with their connection
+    holder.client->review_locks();  // others are reviewed with their connection
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
     if (!connection.is_good || connection.is_good()) continue;
