@@ -147,6 +147,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
   rr::Error lost_error() const;
+  /// Why there is no session, where the last attempt to open one has failed; nullopt also: there is no such service.
+  /// Errors   connection_error.
+  std::optional<rr::Error> failure() const;
   rr::Error lost_error(const std::optional<rr::Error>& reason) const;
   /// The objects at and below a path were replaced.
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
