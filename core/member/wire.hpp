@@ -72,6 +72,7 @@ struct WireConnection {
   std::optional<WireValue> waiting = {};  ///< to be sent when the stream has room; newest only
   TimePoint waiting_since = {};           ///< when that came here
   Ledger ledger = {};
+  std::shared_ptr<const void> object_use = {};  ///< a service's: its object is remembered as long as this is connected
 
   /// Whether a packet of this time is newer than all before; remembers it.
   bool accept(TimeSpec time);

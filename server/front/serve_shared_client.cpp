@@ -70,12 +70,15 @@ struct SharedPass : rr::RequestPass {
   AuditEntryPtr entry;
 };
 
-/// An emergency stop, and the like: it passes where others are refused because there were too many.
+/// An emergency stop, and the like, or the end of a lease: it passes where others are refused because there were too
+/// many.
 bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
   const bool is_command = wanted.type == rr::EntryType::function_call_req ||
                           wanted.type == rr::EntryType::property_set_req ||
                           wanted.type == rr::EntryType::wire_poke_out_value_req;
-  const auto* device = is_command && wanted.member ? gateway.devices().find(device_name) : nullptr;
+  if (!is_command || !wanted.member) return false;
+  if (device_name == gateway_device) return wanted.member->name == "release_lease";
+  const auto* device = gateway.devices().find(device_name);
   return device && device->config().leases.is_urgent(std::string(wanted.path) + "." + wanted.member->name);
 }
 
@@ -149,6 +152,23 @@ auto make_admission(GatewayState& gateway, const SharedNode& node, std::string p
   };
 }
 
+/// A service is offered once its device has let the gateway in. Until then clients hear why it does not; on the
+/// gateway's own node, of devices that they may know of.
+auto explain_missing(GatewayState& gateway, const Connection& connection, const std::string& device_of_node) {
+  return [&gateway, who = connection.identity, device_of_node](std::string_view service) -> std::optional<rr::Error> {
+    for (const auto& device : gateway.devices().all()) {
+      const auto& name = device->config().name;
+      const bool is_meant = device_of_node.empty() ? gateway.access().sees(who, name) : name == device_of_node;
+      if (!is_meant || !device->is_shared()) continue;
+      const auto session = device->find_shared(std::string(service));
+      if (auto failure = session ? (*session)->failure() : std::nullopt) return failure;
+      const bool is_away = !session && session.error().code == rr::ErrorCode::connection_error;
+      if (is_away && !device_of_node.empty()) return session.error();
+    }
+    return std::nullopt;
+  };
+}
+
 /// Whoever waits for the end of the session is woken by `ended`.
 std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& connection, Destination destination,
                                             std::unique_ptr<rr::ByteStream> client, std::string base_url,
@@ -161,6 +181,7 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
       .base_url = std::move(base_url),
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
       .enter = make_entrance(gateway, *destination.node, connection, rights),
+      .why_missing = explain_missing(gateway, connection, device),
       .lock_rights = {
           .admit =
               [rights](auto path, const auto* user, bool is_asked) {

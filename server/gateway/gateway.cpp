@@ -263,8 +263,8 @@ rr::Result<> Gateway::reconfigure(Config next) {
 }
 
 void Gateway::end_those_not_good() {
-  for (const auto& device : devices_.all())
-    for (const auto& [service, locks] : device->locks()) locks->review_leases();
+  for (const auto& [key, holder] : lease_holders_)
+    holder.client->review_locks();  // others are reviewed with their connection
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
     if (!connection.is_good || connection.is_good()) continue;

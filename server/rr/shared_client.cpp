@@ -59,9 +59,7 @@ void SharedClient::review() {
     home_->leave_pipe(*this, id);
     close_pipe(id);
   }
-  if (!service_ || !rights_.admit) return;
-  home_->review_locks(
-      *this, [this](const std::string& path) { return rights_.admit(path, session_.user(), false).has_value(); });
+  if (service_) home_->review_locks(*this);
 }
 
 bool SharedClient::handle_event(rr::Now) {
@@ -398,6 +396,10 @@ rr::Result<> SharedClient::admit_lock(const rr::LockWanted& wanted) {
                           wanted.command == rr::LockCommand::release_lease;
   if (!rights_.admit || (gives_back && home_->has_lock(*this, wanted.path))) return {};
   return rights_.admit(wanted.path, session_.user(), true);
+}
+
+bool SharedClient::may_lock(const std::string& path) const {
+  return !rights_.admit || rights_.admit(path, session_.user(), false).has_value();
 }
 
 void SharedClient::begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done) {

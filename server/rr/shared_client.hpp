@@ -104,6 +104,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
     return rights_.has_role && rights_.has_role(role, session_.user());
   }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
+  bool may_lock(const std::string& path) const override;
   std::shared_ptr<Upstream> upstream_in_use() const override { return home_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, &callback);

@@ -15,6 +15,7 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.base_url = std::move(arrival.base_url);
   options.admit = std::move(arrival.admit);
   options.enter = std::move(arrival.enter);
+  options.why_missing = std::move(arrival.why_missing);
   const auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
   options.attributes.items.emplace_back(std::string(session_attribute), key);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;

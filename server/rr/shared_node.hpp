@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/limits/memory_budget.hpp"
@@ -18,6 +19,8 @@ struct SharedArrival {
   std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
   /// See ServiceSessionOptions.
   std::function<rr::Result<std::shared_ptr<rr::RequestPass>>(const rr::MemberAccess&)> enter;
+  /// See ServiceSessionOptions.
+  std::function<std::optional<rr::Error>(std::string_view service)> why_missing;
   LockRights lock_rights;
   bool is_encrypted = false;
   MemoryBudget::Charge memory;  ///< what is held for it

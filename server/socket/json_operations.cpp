@@ -69,7 +69,7 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"release",
      Verb::lock,
      &JsonOperations::pass_on<&release_lease>,
-     {.needs_own = true, .gives_back = true, .is_free = true, .recorded = Recorded::never}},
+     {.needs_own = true, .gives_back = true, .recorded = Recorded::never}},
     {"login", Verb::read, &JsonOperations::login, {.has_target = false, .comes_first = true}},
 };
 
@@ -114,7 +114,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
-  const bool passes = operation && is_urgent(*request, *operation);
+  const bool passes = operation && (operation->traits.gives_back || is_urgent(*request, *operation));
   if (operation && operation->traits.keeps_order && !passes) {
     co_await queue(request, std::move(memory));
     co_return;

@@ -49,7 +49,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     bool needs_own = false;    ///< to be a client of its own
     bool keeps_order = false;  ///< goes behind those before it that do
     bool comes_first = false;  ///< the next message waits for it
-    bool gives_back = false;   ///< what is the client's own: needs no right
+    bool gives_back = false;   ///< what is the client's own: needs no right, and is never too much
     bool asks_shape = false;   ///< see AccessRequest::is_shape
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
     Recorded recorded = Recorded::each_time;

@@ -143,13 +143,7 @@ void JsonOperations::review() {
     outbox_->add(it->second.opening.token(), news_of(it->first, news));
     it = open_.erase(it);
   }
-  if (!own_) return;
-  const auto own = own_;
-  own->review_locks([this](const std::string& path) {
-    const AccessRequest wanted{
-        .device = place_.device->config().name, .service = place_.key.service, .path = path, .verb = Verb::lock};
-    return place_.standing->check(wanted, Recorded::never).has_value();
-  });
+  if (const auto own = own_) own->review_locks();
 }
 
 // --- the device asks ---

@@ -64,8 +64,13 @@ class GatewayState {
   /// Documents about devices that were asked for lately, by what they are made of.
   using Documents = BoundedTable<std::string, Response>;
   Documents& documents() { return documents_; }
-  /// Clients that hold a lease for requests of HTTP, by the key that those show; each until its lease ends.
-  std::map<std::string, std::shared_ptr<ValueClient>, std::less<>>& lease_holders() { return lease_holders_; }
+  /// A client that holds a lease for requests of HTTP.
+  struct LeaseHolder {
+    std::shared_ptr<ValueClient> client;
+    std::string url_path;  ///< by which the lease was asked for
+  };
+  /// By the key that the requests show; each until its lease ends.
+  std::map<std::string, LeaseHolder, std::less<>>& lease_holders() { return lease_holders_; }
   /// Of whom TLS handshakes go on.
   HandshakeTurns& handshakes() { return handshakes_; }
   /// What would take long on this thread.
@@ -120,7 +125,7 @@ class GatewayState {
   DeviceRegistry devices_;
   ValueClients clients_;
   std::unique_ptr<Recordings> recordings_;
-  std::map<std::string, std::shared_ptr<ValueClient>, std::less<>> lease_holders_;
+  std::map<std::string, LeaseHolder, std::less<>> lease_holders_;
   std::unique_ptr<FoundDevices> found_;
   PageLinks pages_;
   Admission admission_;

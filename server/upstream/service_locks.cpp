@@ -11,8 +11,6 @@ namespace rrgate {
 
 namespace {
 
-constexpr const char* right_is_gone = "its holder has no right to it any more";
-
 rr::TimePoint steady_now() {
   return std::chrono::steady_clock::now();
 }
@@ -83,24 +81,15 @@ void ServiceLocks::handle_wanted(const UpstreamClient& client, const rr::LockWan
   settle();
 }
 
-void ServiceLocks::review(const UpstreamClient& client, const std::function<bool(const std::string&)>& may_lock) {
+void ServiceLocks::review(const UpstreamClient& client) {
   const auto known = clients_.find(&client);
   if (known == clients_.end()) return;
   const auto id = known->second;
   for (const auto& path : table_.paths_of(id))
-    if (!may_lock(path)) table_.handle_right_lost(id, path, steady_now());
+    if (!client.may_lock(path)) table_.handle_right_lost(id, path, steady_now());
   for (const auto& lease : leases_.held())
-    if (lease.holder == id && !may_lock(lease.path)) leases_.handle_lost(lease.path, right_is_gone);
-  settle();
-}
-
-void ServiceLocks::review_leases() {
-  for (const auto& lease : leases_.held()) {
-    const auto holder =
-        std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) { return each.second == lease.holder; });
-    if (holder != clients_.end() && !holder->first->may_hold(lease.path))
-      leases_.handle_lost(lease.path, right_is_gone);
-  }
+    if (lease.holder == id && !client.may_lock(lease.path))
+      leases_.handle_lost(lease.path, "its holder has no right to it any more");
   settle();
 }
 

@@ -47,10 +47,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   /// `done`  is called exactly once; with invalid_operation where the client is removed before.
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
-  /// Gives back what the client has locked or leased, or waits for, where it may not lock any more.
-  void review(const UpstreamClient& client, const std::function<bool(const std::string& path)>& may_lock);
-  /// Ends the leases of those who may hold them no more, as they say themselves.
-  void review_leases();
+  /// Gives back what the client has locked or leased, or waits for, where UpstreamClient::may_lock() says no by now.
+  void review(const UpstreamClient& client);
   /// Whether the client has a lock, a monitor or a lease of this object, or has lost one and not given it back.
   bool has_at(const UpstreamClient& client, std::string_view path) const;
   /// Whether the client may use a member now. Errors   those of LockTable::check() and LeaseTable::check().

@@ -52,8 +52,8 @@ class UpstreamClient {
   virtual bool has_role(std::string_view) const { return false; }
   /// What is to be recorded of the end of its lease; null: nothing.
   virtual AuditEntryPtr begin_lease_end(const std::string&) const { return nullptr; }
-  /// Whether it may hold the lease of an object still; see ServiceLocks::review_leases().
-  virtual bool may_hold(const std::string&) const { return true; }
+  /// Whether it may have a lock or a lease of an object still, as its rights are now; see ServiceLocks::review().
+  virtual bool may_lock(const std::string&) const { return true; }
   /// Its lease has ended.
   virtual void lease_ended(const std::string&, const std::string&) const {}
   /// The one that its requests go by.
@@ -147,6 +147,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
   rr::Error lost_error() const;
+  /// Why there is no session, where the last attempt to open one has failed; nullopt also: there is no such service.
+  /// Errors   connection_error.
+  std::optional<rr::Error> failure() const;
   rr::Error lost_error(const std::optional<rr::Error>& reason) const;
   /// The objects at and below a path were replaced.
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
@@ -167,9 +170,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void lock(UpstreamClient& client, const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
 
   /// See ServiceLocks::review().
-  void review_locks(const UpstreamClient& client, const std::function<bool(const std::string&)>& may_lock) {
-    locks_->review(client, may_lock);
-  }
+  void review_locks(const UpstreamClient& client) { locks_->review(client); }
   /// See ServiceLocks::has_at().
   bool has_lock(const UpstreamClient& client, std::string_view path) const { return locks_->has_at(client, path); }
 

@@ -82,7 +82,7 @@ AuditEntryPtr ValueClient::begin_lease_end(const std::string& path) const {
   return standing_ ? standing_->begin(to_lock(path), "lease_end") : nullptr;
 }
 
-bool ValueClient::may_hold(const std::string& path) const {
+bool ValueClient::may_lock(const std::string& path) const {
   return !needs_right_ || standing_->check(to_lock(path), Recorded::never).has_value();
 }
 

@@ -75,16 +75,14 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   /// `timeout`  the dead-man's time, where a lease is asked for.
   rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path, std::chrono::milliseconds timeout = {});
   /// Gives back what it has locked or leased where it may not any more.
-  void review_locks(const std::function<bool(const std::string& path)>& may_lock) {
-    upstream_->review_locks(*this, may_lock);
-  }
+  void review_locks() { upstream_->review_locks(*this); }
   /// Whether it has a lock or a lease of this object, or has lost one and not given it back.
   bool has_lock(std::string_view path) const { return upstream_->has_lock(*this, path); }
   /// Called when a lease of its own has ended, with the object's path and why.
   void on_lease_ended(std::function<void(const std::string& path, const std::string& why)> handler) {
     on_lease_ended_ = std::move(handler);
   }
-  /// Who it is, for what leases need of that. `needs_right`  whether its leases end when it may not lock any more.
+  /// Who it is, for what leases need of that. `needs_right`  whether it loses locks and leases with the right to lock.
   void set_standing(StandingPtr standing, bool needs_right = true) {
     standing_ = std::move(standing);
     needs_right_ = needs_right;
@@ -139,7 +137,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   Subject lock_user() const override { return user_; }
   bool has_role(std::string_view role) const override { return standing_ && standing_->identity().has_role(role); }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
-  bool may_hold(const std::string& path) const override;
+  bool may_lock(const std::string& path) const override;
   void lease_ended(const std::string& path, const std::string& why) const override {
     if (on_lease_ended_) on_lease_ended_(path, why);
   }

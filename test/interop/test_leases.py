@@ -19,6 +19,7 @@ from shared_sites import Site, is_refused, start_arm_v2
 from tap import Held
 from users import PASSWORDS, basic, make_users
 
+GATEWAY = "rr+tcp://127.0.0.1:{}/?nodename=rrgate&service=gateway"
 LOCKED = RR.ObjectLockedException
 DEADMAN = 200
 SOON = 0.3  # s, behind the dead-man's time: when the device is safe
@@ -34,7 +35,7 @@ def site(node, tmp_path):
 @pytest.fixture
 def gateway(site):
     """The gateway's own service."""
-    root = site.node.ConnectService(f"rr+tcp://127.0.0.1:{site.port}/?nodename=rrgate&service=gateway")
+    root = site.node.ConnectService(GATEWAY.format(site.port))
     site.roots.append(root)
     return root
 
@@ -118,6 +119,9 @@ def test_a_stop_passes_where_others_are_refused_for_rates(node, tmp_path):
     site = Site(tmp_path, node, {"leases": LEASES}, rates={"client": {"per_second": 2}, "device": {"per_second": 2}}, asked_from="127.0.0.9")
     try:
         native = site.connect("plain")
+        session = session_of(native)
+        gateway = site.node.ConnectService(GATEWAY.format(site.port))
+        site.roots.append(gateway)
         with Socket(site.port, PLAIN) as page:
             page.send("get", "speed")
             wait_for(lambda: ask(site.port, "GET", PLAIN + "/speed").status == 429)
@@ -129,6 +133,11 @@ def test_a_stop_passes_where_others_are_refused_for_rates(node, tmp_path):
             assert is_slow.count(1) > 10
             assert any(is_refused(RR.OutOfSystemResourceException, lambda: native.speed) for _ in range(20))
             assert any(ask(site.port, "GET", PLAIN + "/finish").status == 429 for _ in range(20))  # no command
+            for _ in range(20):  # nor is anybody held up who gives back what others wait for
+                with pytest.raises(RR.InvalidOperationException, match="has no lease"):
+                    gateway.release_lease(session, "plain")
+                assert page.refusal("release")[0] == "InvalidOperation"
+                page.ask("unlock")
     finally:
         site.stop()
 

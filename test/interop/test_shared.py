@@ -323,6 +323,19 @@ def test_a_client_too_many_hears_why(node, tmp_path, mode, scheme):
         service.stop()
 
 
+def test_who_comes_while_the_device_refuses_the_gateway_hears_why(node, tmp_path):
+    service, url = start_service(tmp_path)
+    login = {"username": "alice", "password": "hunter2"}
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared", "login": login}, retry=RETRY)
+    try:
+        for query in ("nodename=interop&service=guarded", "service=guarded"):
+            with pytest.raises(RR.ConnectionException, match="'guarded' of device 'interop': .*Authentication Failed"):
+                node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?{query}")
+    finally:
+        gateway.stop()
+        service.stop()
+
+
 def test_a_device_without_a_service_index(node, tmp_path):
     """What its URL names is a service too, and is so again when the device comes back."""
     service, url = start_arm(tmp_path)

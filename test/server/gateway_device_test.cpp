@@ -14,15 +14,16 @@ struct Robot {
   std::shared_ptr<rr::Service> service;
   rr::RunningNode node;
 
-  Robot()
+  explicit Robot(const rr::SecurityPolicy& policy = {})
       : service(rr::Service::from_text({"service test.robot\nobject Robot\nproperty int32 one [readonly]\n"
                                         "function void fail(uint16 code)\nevent news(string text)\nend\n"},
                                        "Robot", "Robot")),
-        node([this](rr::Node& made) {
+        node([this, &policy](rr::Node& made) {
           service->property("one").get([] { return 1; });
           service->function("fail", [](std::uint16_t code) {
             throw rr::ServiceException("as asked", static_cast<rr::ErrorCode>(code));
           });
+          service->set_security(policy);
           made.add(service);
         }) {}
 
@@ -120,4 +121,72 @@ TEST_CASE("a reader of an event stream that falls behind is told, and its stream
   begin_stream(again);
   robot.fire(1, "as ever");
   CHECK_THAT(again.receive_until("as ever"), Catch::Contains("as ever"));
+}
+
+namespace {
+
+/// Lets nobody in, or everybody.
+struct Doorkeeper final : rr::Authenticator {
+  rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt& attempt) const override {
+    if (lets_in) return rr::AuthenticatedUser{attempt.username};
+    return rr::make_error(rr::ErrorCode::authentication_error, "come back later");
+  }
+  std::atomic<bool> lets_in = false;
+};
+
+rr::Error refusal_of(const std::string& url) {
+  return rr::error_of([&] { (void)rr::connect(url); });
+}
+
+}  // namespace
+
+TEST_CASE("who comes while a device refuses the gateway hears why, and not that there is no such service") {
+  const auto doorkeeper = std::make_shared<Doorkeeper>();
+  rr::SecurityPolicy policy;
+  policy.require_valid_user = true;
+  policy.authenticator = doorkeeper;
+  Robot robot(policy);
+  const TestGateway gateway(0, [&](Config& config) {
+    with(robot)(config);
+    auto& device = config.devices.front();
+    device.mode = DeviceMode::shared;
+    device.login.username = "gateway";
+    config.retry = Retry{milliseconds(50), milliseconds(50), milliseconds(50)};
+  });
+  const auto port = std::to_string(gateway.port());
+  const std::vector<std::string> ways{"rr+tcp://127.0.0.1:" + port + "/?nodename=robot&service=Robot",
+                                      "rr+tcp://127.0.0.1:" + port + "/?service=Robot"};
+  for (const auto& way : ways) {
+    INFO(way);
+    const auto refusal = refusal_of(way);
+    CHECK(refusal.code == rr::ErrorCode::connection_error);
+    CHECK_THAT(refusal.message,
+               Catch::Contains("'Robot' of device 'robot'") && Catch::Contains("Authentication Failed"));
+  }
+  CHECK(refusal_of("rr+tcp://127.0.0.1:" + port + "/?nodename=robot&service=Another").code ==
+        rr::ErrorCode::service_not_found);
+  doorkeeper->lets_in = true;
+  const auto end = std::chrono::steady_clock::now() + 10s;
+  while (refusal_of(ways.front()).code != rr::ErrorCode::none && std::chrono::steady_clock::now() < end)
+    std::this_thread::yield();
+  for (const auto& way : ways) CHECK(rr::connect(way).get("one") == rr::Value(1));
+}
+
+TEST_CASE("who comes to a shared device that is away hears so") {
+  std::string url;
+  {
+    const Robot robot;
+    url = robot.node.url("Robot");
+  }
+  const TestGateway gateway(0, [&](Config& config) {
+    DeviceConfig device;
+    device.name = "robot";
+    device.url = rr::parse_url(url).value();
+    device.mode = DeviceMode::shared;
+    config.devices.push_back(device);
+  });
+  const auto refusal =
+      refusal_of("rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=robot&service=Robot");
+  CHECK(refusal.code == rr::ErrorCode::connection_error);
+  CHECK_THAT(refusal.message, Catch::Contains("device 'robot' is offline"));
 }

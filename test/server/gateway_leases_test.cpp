@@ -1,4 +1,4 @@
-// Leases over HTTP: who may give one back, and who loses one.
+// Leases over HTTP: who may give one back, and when, and who loses one.
 #include <catch2/catch.hpp>
 
 #include "test/node/node/node_fixture.hpp"
@@ -13,6 +13,7 @@ namespace {
 
 /// A shared device with leases, and three tokens: "ann" and "olga" may do all, "vera" may read.
 struct LeasedRobot {
+  Rates rates = {};
   rr::RunningNode node{[](rr::Node& made) {
     const auto service =
         rr::Service::from_text({"service test.leased\nobject Robot\nproperty double speed\nend\n"}, "Robot", "Robot");
@@ -30,6 +31,7 @@ struct LeasedRobot {
                         robot.mode = DeviceMode::shared;
                         robot.leases.is_offered = true;
                         config.devices.push_back(robot);
+                        config.rates = rates;
                         config.access.tokens_file = files.write("tokens", tokens("operator"));
                         const std::vector<Verb> all{std::begin(all_verbs), std::end(all_verbs)};
                         config.access.rules = {{.roles = {"operator"}, .may = all},
@@ -94,4 +96,20 @@ TEST_CASE("who has the key of a lease may release it, whatever rights he has lef
   CHECK(robot.end_lease(robot.vera, key) == 204);
   CHECK(robot.set_speed(robot.vera) == 204);
   CHECK(robot.end_lease(robot.vera, key) == 403);
+}
+
+TEST_CASE("a lease is given back however much was asked for") {
+  static constexpr RateLimit few{.per_second = 5};
+  const auto rates = GENERATE(Rates{.client = few}, Rates{.user = few}, Rates{.device = few});
+  const LeasedRobot robot{rates};
+  const auto key = robot.lease(robot.ann);
+  const auto is_too_much = [&](const std::string& first, const std::string& lease) {
+    return LeasedRobot::comes_to([&] { return robot.ask(first, robot.ann, lease).status == 429; });
+  };
+  const std::string service = "/api/v1/devices/robot/Robot";
+  CHECK(is_too_much("POST " + service + "?lease=renew", key));
+  CHECK(is_too_much("POST " + service + "/speed?lease=release", key));  // of something else
+  CHECK(is_too_much("POST " + service + "?lease=release", "another"));
+  CHECK(robot.end_lease(robot.ann, key) == 204);
+  CHECK(is_too_much("POST " + service + "?lease=release", key));  // it is over
 }

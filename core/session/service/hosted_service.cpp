@@ -115,10 +115,7 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path, R
                         "object " + quote(prefix) + " has the unknown type " + quote(found.object->type_name()));
     if (remembers == RememberObjects::no) continue;
     // One that is not remembered would be another object for each who asks: none of them would hear of the others'.
-    if (objects_.size() >= max_cached_objects && !make_room(prefix))
-      return make_error(ErrorCode::out_of_system_resource,
-                        "object " + quote(prefix) + ": clients use too many paths of objects, expected at most " +
-                            std::to_string(max_cached_objects));
+    if (objects_.size() >= max_cached_objects && !make_room(prefix)) return no_room(prefix);
     remember(std::string(prefix), found);
   }
   return found;
@@ -147,17 +144,18 @@ bool HostedService::make_room(std::string_view path) {
   return true;
 }
 
+Error HostedService::no_room(std::string_view path) {
+  return make_error(ErrorCode::out_of_system_resource,
+                    "object " + quote(path) + ": clients use too many paths of objects, expected at most " +
+                        std::to_string(max_cached_objects));
+}
+
 Result<> HostedService::add_object(const std::string& path, std::shared_ptr<ServiceObject> object) {
   const auto* type = types_->find_entity(object->type_name());
   if (!type || type->kind != EntityKind::object)
     return make_error(ErrorCode::service_definition_error,
                       "object " + quote(path) + " has the unknown type " + quote(object->type_name()));
-  if (objects_.size() >= max_cached_objects && !objects_.contains(path)) {
-    auto victim = objects_.upper_bound(path);
-    if (victim == objects_.end()) victim = objects_.begin();
-    if (victim->first == name_ && ++victim == objects_.end()) victim = objects_.begin();
-    forget(victim);
-  }
+  if (objects_.size() >= max_cached_objects && !objects_.contains(path) && !make_room(path)) return no_room(path);
   remember(path, Found{std::move(object), type});
   return {};
 }
@@ -188,8 +186,13 @@ std::vector<std::string> HostedService::paths_of(const ServiceObject& object) co
 }
 
 void HostedService::remember(std::string path, Found found) {
-  if (const auto known = objects_.find(path); known != objects_.end()) forget(known);
+  std::shared_ptr<const void> use;
+  if (const auto known = objects_.find(path); known != objects_.end()) {
+    use = std::move(known->second.use);
+    forget(known);
+  }
   const auto object = objects_.emplace(std::move(path), Known(std::move(found))).first;
+  object->second.use = std::move(use);
   paths_.emplace(object->second.object.get(), object->first);
 }
 

@@ -93,8 +93,8 @@ class HostedService {
   /// The path of an object that was found is remembered for as long as its caller has this, unless it is released.
   std::shared_ptr<const void> use_object(std::string_view path);
   bool has_object(std::string_view path) const { return objects_.contains(path); }
-  /// An object of a remote service that was found. Another one may be forgotten for it.
-  /// Errors   service_definition_error: its type is not known.
+  /// An object of a remote service that was found. Where there is no room, a path that no client uses is forgotten for
+  /// it. Errors   service_definition_error: its type is not known; out_of_system_resource.
   Result<> add_object(const std::string& path, std::shared_ptr<ServiceObject> object);
   /// Forgets `path`, its other spellings and everything below. Returns the spellings that clients have used.
   std::vector<std::string> forget_path(std::string_view path);
@@ -111,6 +111,7 @@ class HostedService {
   HostedService() = default;
   void remember(std::string path, Found found);
   bool make_room(std::string_view path);
+  static Error no_room(std::string_view path);
   Objects::iterator forget(Objects::iterator object);
 
   std::string name_;

@@ -14,6 +14,8 @@ namespace {
 
 /// A closed session's last reply gets out before the connection closes.
 constexpr std::chrono::milliseconds linger{100};
+/// Others find room for theirs. What is forgotten of a remote service is found again where it is asked for.
+constexpr std::size_t max_kept_remote_objects = 1024;
 
 bool is_request(EntryType type) {
   return static_cast<std::uint16_t>(type) % 2 == 1;
@@ -344,12 +346,13 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
   }
 }
 
-/// The object behind a path, which the service remembers for as long as this client is there. The application, which is
-/// asked, may end the session.
+/// The object behind a path, which the service remembers for as long as this client is there; of a remote service so
+/// many that no client alone takes all the room. The application, which is asked, may end the session.
 Result<HostedService::Found> ServiceSession::find_object(std::string_view path) {
   const auto service = service_;
   auto found = service->find_object(path);
-  if (found && service_ && !service->is_remote() && path != service->name() && !used_objects_.contains(path))
+  const bool is_kept = !service->is_remote() || used_objects_.size() < max_kept_remote_objects;
+  if (found && service_ && is_kept && path != service->name() && !used_objects_.contains(path))
     used_objects_.emplace(path, service->use_object(path));
   return found;
 }

@@ -75,6 +75,9 @@ struct ServiceSessionOptions {
   std::function<Result<std::shared_ptr<RequestPass>>(const MemberAccess&)> enter = {};
   /// Told of the service that is connected to, beside its own attributes.
   MapString attributes = {};
+  /// Why a service is not there that the node would have otherwise; nullopt: there is none. Asked for those who may
+  /// know of it. None: as nullopt.
+  std::function<std::optional<Error>(std::string_view service)> why_missing = {};
   /// With it nothing is served here: the first request for a service fails so, and the session ends behind it.
   std::optional<Error> refusal = {};
 };
@@ -351,6 +354,7 @@ class ServiceSession {
   Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member,
                  const AuthenticatedUser* user) const;
   Result<> admit_special(const Message& message, const MessageEntry& entry) const;
+  Error missing_service(std::string_view name) const;
   const ServiceDefinition* find_definition(std::string_view service, std::string_view name) const;
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
   bool refuse_reused_id(const MessageEntry& entry, Now now);

@@ -167,6 +167,7 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
     case EntryType::object_type_name:
       return write_root_type(message, entry);
     case EntryType::connect_client:
+      if (!directory_.find(entry.service_path)) return missing_service(entry.service_path);
       return connect(directory_.find(entry.service_path), message.header.sender_node_id, message.header.sender_endpoint,
                      std::nullopt, now);
     case EntryType::connect_client_combined:
@@ -212,12 +213,17 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
     return {};
   }
   const auto service = directory_.find(entry.service_path);
-  if (!service) return service_not_found();
+  if (!service) return missing_service(entry.service_path);
   if (auto packed = write_attributes("attributes", *service); !packed) return packed;
   if (!service->extra_imports().empty())
     add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
   outgoing_.add_text("servicedef", service->root_definition().text);
   return {};
+}
+
+Error ServiceSession::missing_service(std::string_view name) const {
+  const bool is_told = options_.why_missing && admits(EntryType::null, name, nullptr);
+  return (is_told ? options_.why_missing(name) : std::nullopt).value_or(service_not_found());
 }
 
 /// Of one service, else of any other that the client may know of.
@@ -257,7 +263,7 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   const bool logs_in = has_login(message, entry);
   // Who may not connect without a login does not hear by it either what there is.
   if (!service && logs_in && !admits(entry.type, entry.service_path, nullptr)) return login_failed();
-  if (!service) return service_not_found();
+  if (!service) return missing_service(entry.service_path);
   const auto type_name = type_for_client(*service, *version);
   const auto* type = service->types().find_entity(type_name);
   if (!type) return service_not_found();

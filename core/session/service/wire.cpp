@@ -112,7 +112,8 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
                       "this client has " + std::to_string(options_.max_wires) + " wires connected already");
   // A second request of a connected client is accepted: it is the same connection.
   const bool is_remote = service_->is_remote();
-  const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
+  WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
+  fresh.object_use = service_->use_object(key.path);
   const bool is_new = wires_.try_emplace(key, fresh).second;
   if (is_new && is_remote) {
     events_.push(WireConnected{key.path, found.object, &member});

@@ -36,7 +36,7 @@ rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& t
   const auto holder = co_await hold_lease(gateway, std::move(asker), std::move(who), std::move(path), command, deadman,
                                           LeaseNeeds::right_to_lock);
   auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
-  gateway.lease_holders().emplace(key, holder);
+  gateway.lease_holders().emplace(key, GatewayState::LeaseHolder{holder, std::string(request.request().path())});
   holder->on_lease_ended([&gateway, key, executor = holder->upstream()->device().executor()](const auto&, const auto&) {
     boost::asio::post(executor, [&gateway, key] { gateway.lease_holders().erase(key); });  // not within its own call
   });
@@ -67,6 +67,12 @@ std::optional<std::string_view> lease_event(const ObjectRequest& request, const 
 bool releases_own_lease(const ObjectRequest& request, const Target& target) {
   return !target.member && request.method() == http::verb::post && request.option("lease") == "release" &&
          target.client->has_lock(target.path());
+}
+
+bool shows_own_lease(GatewayState& gateway, const Request& request) {
+  const auto holder = gateway.lease_holders().find(request.header(lease_header));
+  return holder != gateway.lease_holders().end() && holder->second.url_path == request.path() &&
+         rr::query_value(request.query(), "lease") == "release";
 }
 
 rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target) {

@@ -247,8 +247,8 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     if (const auto lease = writer.request().header(lease_header); !lease.empty()) {
       const auto holder = gateway.lease_holders().find(lease);
       // A key that is none any more: its commands are those of a client without a lease.
-      if (holder != gateway.lease_holders().end() && holder->second->upstream() == used->upstream())
-        used = holder->second;
+      if (holder != gateway.lease_holders().end() && holder->second.client->upstream() == used->upstream())
+        used = holder->second.client;
     }
     std::optional<rr::Error> unseen;
     LookJudge may_look = [&](const AccessRequest& object) {
@@ -356,8 +356,10 @@ std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& r
   if (method == http::verb::post && path == "/api/v1/agents/stop") return UrgentCommand{.verb = Verb::admin};
   if ((method != http::verb::post && method != http::verb::put) || !path.starts_with(objects_prefix)) return {};
   const auto segments = split_path(path.substr(objects_prefix.size()));
-  const auto* device = segments && segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
-  if (!device || !is_urgent_member(*device, *segments)) return {};
+  if (!segments || segments->size() < 2) return {};
+  const bool gives_back = method == http::verb::post && shows_own_lease(gateway, request);
+  const auto* device = segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
+  if (!gives_back && (!device || !is_urgent_member(*device, *segments))) return {};
   return UrgentCommand{(*segments)[0], (*segments)[1]};
 }
 

@@ -16,7 +16,7 @@ inline constexpr std::array<std::string_view, 5> device_resources = {"subscripti
                                                                      "thing-description.json", "types.d.ts"};
 
 /// A request that no rate holds up, as long as somebody may `verb` the service: it commands a member of a device that
-/// is urgent (LeaseConfig::is_urgent()), or stops all agents.
+/// is urgent (LeaseConfig::is_urgent()), gives back a lease whose key it shows, or stops all agents.
 struct UrgentCommand {
   std::string device = {};
   std::string service = {};
