@@ -371,7 +371,6 @@ const german: Readonly<Record<string, string>> = {
   "New value of {0}": "Neuer Wert von {0}",
   "Plot of {0} over the last 30 seconds": "Kurven von {0} der letzten 30 Sekunden",
   "{0} values a second": "{0} Werte je Sekunde",
-  "no values in the last 2 s": "keine Werte in den letzten 2 s",
   "; this one is {0}": "; dieser ist {0}",
   "Value to send on {0}": "Wert, der über {0} gesendet wird",
   "Listening. Nothing heard yet.": "Hört zu. Noch nichts gehört.",
