@@ -35,7 +35,8 @@ import { nameOf, PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
 import { StopButton, useSafe } from "./stop";
 import { UndoBar, useUndo } from "./undo";
-import "../styles/board.css";
+import "./board.css";
+import "../panels/parts.css";
 
 type ServiceRoute = Route & { page: "service" };
 

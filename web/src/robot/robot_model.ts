@@ -248,16 +248,6 @@ export function sideOf(bits: number): string {
   return ["", "right", "left", "both sides"][bits & 3] ?? "";
 }
 
-/** By the members that the page cannot do without. */
-export function isCreate(remote: Remote): boolean {
-  const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
-  return (
-    drive?.parameters.length === 2 &&
-    drive.parameters.every((p) => p.type === "int16") &&
-    remote.has("DistanceTraveled", "property")
-  );
-}
-
 function pause(ms: number, signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const timer = setTimeout(resolve, ms);
