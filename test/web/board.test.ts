@@ -6,6 +6,7 @@ import { findRoom, nudge, put, settle, spread } from "../../web/src/board/layout
 import type { Placed } from "../../web/src/board/layout";
 import { hasPreset, presetFor, stopFor } from "../../web/src/board/presets";
 import { Pace } from "../../web/src/live/pace";
+import { formatRate } from "../../web/src/live/rate";
 import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
 import { hexLines, greyPicture } from "../../web/src/panels/bytes";
@@ -279,6 +280,10 @@ describe("a pace", () => {
     expect(last).toBeGreaterThan(rate * 0.9);
     expect(last).toBeLessThan(rate * 1.1);
     expect(most).toBeLessThan(rate * 2);
+  });
+
+  test("has a rate in words that is as long for 9.96 as for 10.04", () => {
+    expect([0.2, 9.94, 9.96, 10.04, 123.4].map(formatRate)).toEqual(["0.2", "9.9", "10", "10", "123"]);
   });
 
   test("has no rate of a single burst", () => {

@@ -317,7 +317,7 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
             {t("Open file")}
           </button>
           <button class="button button-quiet" type="button" onClick={reset}>
-            {t("As at first")}
+            {t("Reset board")}
           </button>
         </>
       )}

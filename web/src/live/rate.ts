@@ -15,6 +15,9 @@ interface Slot {
   count: number;
 }
 
+/** As long for what is nearly ten as for ten: texts beside it stay where they are. */
+export const formatRate = (perSecond: number): string => perSecond.toFixed(perSecond < 9.95 ? 1 : 0);
+
 export class Rate {
   readonly #slots: Slot[] = [];
 

@@ -5,6 +5,7 @@ import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Plot } from "../chart/plot";
 import { Pace } from "../live/pace";
+import { formatRate } from "../live/rate";
 import { explain } from "../robot/remote";
 import { Series } from "../robot/series";
 import { Failure } from "../ui/failure";
@@ -98,7 +99,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         )}
       </div>
       <p class="note">
-        {rate > 0 ? t("{0} values a second", rate.toFixed(1)) : t("no regular values")}
+        {rate > 0 ? t("{0} values a second", formatRate(rate)) : t("no regular values")}
         {age !== null && t("; this one is {0}", age)}
       </p>
       <Failure text={failure} />
