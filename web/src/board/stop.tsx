@@ -37,7 +37,7 @@ export function StopButton({ object, stop, place, safe }: StopButtonProps) {
   const does = stop
     ? t("calls {0}", `${stop.call}(${stop.args.join(", ")})`)
     : t("lets the gateway make it safe: {0}", safe.join(", "));
-  const words = matchMedia("(any-hover: hover)").matches ? t("{0}; also with the Esc key", does) : does;
+  const words = matchMedia("(any-hover: hover)").matches ? t("{0}; or press Esc", does) : does;
   return <StopPress send={send} words={words} label={t("Stop")} byEscape />;
 }
 

@@ -195,7 +195,7 @@ const german: Readonly<Record<string, string>> = {
   "arrived after {0} ms, {1}": "angekommen nach {0} ms, {1}",
   "lets the gateway make it safe: {0}": "lässt das Gateway es sichern: {0}",
   "calls {0}": "ruft {0}",
-  "{0}; also with the Esc key": "{0}; auch mit der Esc-Taste",
+  "{0}; or press Esc": "{0}; oder Esc drücken",
   copied: "kopiert",
   done: "erledigt",
   "each step": "je Schritt",
