@@ -15,7 +15,7 @@ const german: Readonly<Record<string, string>> = {
   "Name a folder for them there, and what devices say can be recorded and played again:":
     "Nennt sie einen Ordner dafür, lässt sich aufzeichnen und wieder abspielen, was Geräte sagen:",
   "To the gateway {0}": "Am Gateway {0}",
-  "Reset board": "Board zurücksetzen",
+  "Reset board": "Tafel zurücksetzen",
   "The board is as at first.": "Die Tafel ist wie am Anfang.",
   "The board is that of the file.": "Die Tafel ist die der Datei.",
   "Removed: {0}": "Entfernt: {0}",
@@ -143,6 +143,7 @@ const german: Readonly<Record<string, string>> = {
     "Diese Werte sind keine Zahlen, die sich als Bild zeigen lassen.",
   "This board is empty. Add a panel above.": "Diese Tafel ist leer. Oben lassen sich Felder hinzufügen.",
   "This object has no events.": "Dieses Objekt hat keine Ereignisse.",
+  "This object has no pipes.": "Dieses Objekt hat keine Pipes.",
   "This object has no generators.": "Dieses Objekt hat keine Generatoren.",
   "This object is no robot of the standard types.": "Dieses Objekt ist kein Roboter der Standardtypen.",
   Time: "Zeit",
