@@ -4,7 +4,7 @@ import { advance, ORIGIN, Reckoner, wrapAngle } from "../../web/src/robot/reckon
 import { RobotModel } from "../../web/src/robot/robot_model";
 import { loopsOf, obstaclesOf, poseOf, wallsOf } from "../../web/src/robot/room";
 import { readSensorPacket } from "../../web/src/robot/sensor_packet";
-import { rateOf, Series } from "../../web/src/robot/series";
+import { Series } from "../../web/src/robot/series";
 import { nameNotes, songAfter } from "../../web/src/robot/song";
 import {
   commandFor,
@@ -356,12 +356,6 @@ describe("series", () => {
     expect(series.samples).toHaveLength(5);
     series.push(4000, NaN);
     expect(series.newest?.t).toBe(3019);
-  });
-  it("counts a rate over two seconds", () => {
-    const series = new Series(5000);
-    for (let t = 0; t < 4000; t += 50) series.push(t, 1);
-    expect(rateOf(series, 3999)).toBe(20);
-    expect(rateOf(series, 9000)).toBe(0);
   });
 });
 

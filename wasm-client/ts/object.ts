@@ -116,7 +116,7 @@ export class ObjectTree {
  * @throws RobotRaconteurError (rejects) ObjectLockedError: somebody else has it; NotImplementedError: there are none;
  * InvalidOperation: this page is hidden; PermissionDenied; InvalidArgument
  */
-export const lease = async (object: RemoteObject, options?: LeaseOptions): Promise<Lease> =>
+export const lease = async (object: { readonly $: ObjectInfo }, options?: LeaseOptions): Promise<Lease> =>
   (await import("./lease/held_lease.js")).lease(object, options);
 
 /** What stands behind `$`; not for users of the package. */
@@ -148,7 +148,7 @@ export class Info implements ObjectInfo {
     released.push(() => this.#release());
   }
 
-  static sessionOf(object: RemoteObject): Session {
+  static sessionOf(object: { readonly $: ObjectInfo }): Session {
     return (object.$ as Info).#session;
   }
 

@@ -8,7 +8,7 @@ import type { UsbFilter, WebUsb } from "./usb/webusb.js";
 export type { UsbFilter };
 
 /** A USB device that this page may use, and the node that it is. */
-export interface UsbNode {
+export type UsbNode = {
   /** For people: 'USB device "Robot" (1209:5252)'. */
   readonly device: string;
   readonly nodeId: string;
@@ -18,7 +18,10 @@ export interface UsbNode {
   readonly url?: string;
   /** Why the device could not be asked who it is. */
   readonly error?: RobotRaconteurError;
-}
+} & (
+  | { readonly url: string; readonly error?: undefined }
+  | { readonly url?: undefined; readonly error: RobotRaconteurError }
+);
 
 /**
  * Lets the user choose a USB device, which this page may use from then on. Call it from a click, a key or a touch.
@@ -26,7 +29,9 @@ export interface UsbNode {
  * @throws RobotRaconteurError OperationCancelled: nothing was chosen; InvalidOperation: no click, or a worker;
  *         SystemResourceError: no WebUSB here; ConnectionError: the device is no node, or cannot be asked.
  */
-export async function requestUsbDevice(filters: UsbFilter[] = [{ classCode: 0xff }]): Promise<UsbNode> {
+export async function requestUsbDevice(
+  filters: UsbFilter[] = [{ classCode: 0xff }],
+): Promise<UsbNode & { readonly url: string }> {
   const usb = findUsb();
   if (!usb.requestDevice)
     throw makeError("InvalidOperation", "a worker cannot ask the user for a USB device: ask in the page");

@@ -16,7 +16,6 @@ import "./styles/base.css";
 import "./styles/controls.css";
 import "./styles/devices.css";
 import "./styles/members.css";
-import "./styles/robot.css";
 
 const list = new DeviceList();
 let isAsking = false;

@@ -105,7 +105,7 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
 test("a plot shows several members, in the address and after a reload", async ({ page, lab }) => {
   await openBoard(page, lab.url);
   await arrange(page);
-  await page.getByRole("button", { name: "As at first" }).click();
+  await page.getByRole("button", { name: "Reset board" }).click();
   await addPanel(page, "plot");
   const plot = page.locator('[data-panel="plot"]').last();
   await plot.getByLabel("Member").selectOption("DistanceTraveled");
@@ -170,7 +170,7 @@ test("a removed panel and a replaced board come back by Undo, until the next cha
   await expect(undo).toBeHidden();
 
   await arrange(page);
-  await page.getByRole("button", { name: "As at first" }).click();
+  await page.getByRole("button", { name: "Reset board" }).click();
   await expect(notes).toHaveCount(0);
   await undo.click();
   await expect(text).toHaveValue("call Vera at 12");
@@ -187,7 +187,7 @@ test("a removed panel and a replaced board come back by Undo, until the next cha
   await expect(text).toHaveValue("call Vera at 12");
 
   await arrange(page);
-  await page.getByRole("button", { name: "As at first" }).click();
+  await page.getByRole("button", { name: "Reset board" }).click();
   await addPanel(page, "locks");
   await expect(page.locator('[data-panel="locks"]')).toBeVisible();
   await expect(undo).toBeHidden();

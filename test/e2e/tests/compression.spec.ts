@@ -65,3 +65,20 @@ test("the page comes compressed, with tags of its own, and in less than half of 
   expect(sizes.br).toBeLessThan(sizes.identity * 0.4);
   expect(sizes.gzip).toBeLessThan(sizes.identity * 0.5);
 });
+
+test("the list of devices comes without the pages of boards and robots, in less than 65 kB of files that are no WebAssembly", async ({
+  page,
+  lab,
+}) => {
+  const files = new Set<string>();
+  page.on("request", (request) => {
+    const { pathname } = new URL(request.url());
+    if (/\.(js|css)$/.test(pathname)) files.add(request.url());
+  });
+  await page.goto(lab.url);
+  await expect(page.locator('[data-device="create"] [data-state="online"]')).toBeVisible();
+  expect([...files].filter((file) => /board_page|robot_page|panel/.test(file))).toEqual([]);
+  let size = 0;
+  for (const file of files) size += (await ask(file, { "accept-encoding": "br" })).body.length;
+  expect(size).toBeLessThan(65_000);
+});

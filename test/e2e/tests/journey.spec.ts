@@ -55,7 +55,7 @@ inEachEngine((at) => {
     const letGo = await visitor.hold(button("left_e0 forward"));
     await visitor.see(third, /^0\.0*[1-9]/);
     await letGo();
-    await visitor.see({ css: '[data-joint="0"] .joint-value' }, /^0 rad$/);
+    await visitor.see({ css: '[data-joint="0"] .joint-value' }, /^0\.0000 rad$/);
     const jogged = await visitor.settled(third);
 
     await visitor.see({ css: '[data-panel="plot"] .u-wrap canvas' });

@@ -46,3 +46,9 @@ test("a new position of a memory can be typed while the old items are shown", as
   await memory.getByRole("button", { name: "Read", exact: true }).click();
   await expect(memory.locator("[data-memory]")).toContainText(/^ +16 {2}/);
 });
+
+test("a pipe panel of an object without pipes says so", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "pipe");
+  await expect(page.locator('[data-panel="pipe"]')).toContainText("This object has no pipes.", { timeout: 5_000 });
+});

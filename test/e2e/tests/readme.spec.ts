@@ -12,7 +12,7 @@ function run(readme: string, lab: Lab): string {
   const [, code] = /```js\n(.*?)```/s.exec(text) ?? [];
   if (!code) throw new Error(`${readme} shows no JavaScript`);
   const address = lab.url.replace("http", "ws").replace(/\/$/, "");
-  const finite = code.replace("console.log(packet);", "console.log(packet.Data.length); break;");
+  const finite = code.replace("console.log(packet);", "console.log(packet.Data.length); break;"); // another packet's bytes each time
   const folder = mkdtempSync(path.join(tmpdir(), "rrgate-readme-"));
   try {
     mkdirSync(path.join(folder, "node_modules"));

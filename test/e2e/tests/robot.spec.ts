@@ -194,6 +194,21 @@ test("it stops when the page is closed while driving", async ({ page, context, l
   await waitUntilStopped(watcher);
 });
 
+test("the chart and the line below it fit in a window that grew", async ({ page }) => {
+  for (const size of [
+    { width: 1280, height: 800 },
+    { width: 1440, height: 900 },
+    { width: 1920, height: 1080 },
+  ]) {
+    await page.setViewportSize(size);
+    const foot = page.locator(".chart-foot");
+    await expect(async () => {
+      const { y, height } = (await foot.boundingBox()) ?? { y: Infinity, height: 0 };
+      expect(y + height).toBeLessThan(size.height);
+    }).toPass({ timeout: 2_000 });
+  }
+});
+
 test("bumps are logged with their time and the bumpers shown", async ({ page }) => {
   await page.getByRole("slider", { name: "Speed" }).fill("500");
   await page.getByRole("slider", { name: "Speed" }).blur();

@@ -39,7 +39,7 @@ test("a standard robot: its state in words, a joint jogged while a button is hel
     last = now;
     expect(isStill).toBe(true);
   }).toPass({ intervals: [300] });
-  await expect(page.locator('[data-joint="0"] .joint-value')).toHaveText("0 rad");
+  await expect(page.locator('[data-joint="0"] .joint-value')).toHaveText("0.0000 rad");
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
   await expect(state).toContainText("halt");
@@ -73,7 +73,7 @@ test("its tool is jogged along an axis of the robot's frame while a button is he
 test("the tool of a robot that says that it can't be jogged has its place, and no buttons", async ({ page }) => {
   await page.goto(`${robot.url}#/devices/peer/not_jogged`);
   const tool = page.locator('[data-tool="planar"]');
-  await expect(tool.locator('[data-axis="X"] .joint-value')).toHaveText("0.9 m");
+  await expect(tool.locator('[data-axis="X"] .joint-value')).toHaveText("0.9000 m");
   await expect(page.getByRole("button", { name: "joint_0 forward" })).toBeVisible();
   await expect(tool.getByRole("button")).toHaveCount(0);
 });

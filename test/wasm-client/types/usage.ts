@@ -1,5 +1,5 @@
 // What programs do with generated types. Compiled, never run: each line marked as an error must be one.
-import { connect, rrValue, subscribe } from "rrgate-client";
+import { connect, lease, listUsbDevices, requestUsbDevice, rrValue, subscribe } from "rrgate-client";
 import type { Complex, RemoteObject, RrValue, SubscriptionState } from "rrgate-client";
 import type { SimulatedCreate } from "generated/create.js";
 import type * as declared from "generated/interop.js";
@@ -8,6 +8,23 @@ import * as words from "generated/words_module.js";
 
 /** Compiles where A and B are the same type. */
 function same<A, B>(_same: (<T>() => T extends A ? 1 : 2) extends <T>() => T extends B ? 1 : 2 ? true : false): void {}
+
+/** Objects of generated types, and those that are asked for by name. */
+export async function hold(): Promise<void> {
+  const robot = await connect<SimulatedCreate>("ws://localhost/?service=Create");
+  await using held = await lease(robot, { deadman: 300 });
+  await using other = await lease(await connect("ws://localhost/?service=any"));
+  // @ts-expect-error no object of a service
+  await lease({});
+  void [held, other];
+}
+
+export async function plugIn(): Promise<string[]> {
+  same<Awaited<ReturnType<typeof requestUsbDevice>>["url"], string>(true);
+  const said: string[] = [];
+  for (const { nodeName, url, error } of await listUsbDevices()) said.push(nodeName, url ?? error.message);
+  return said;
+}
 
 export async function drive(): Promise<number> {
   const robot = await connect<SimulatedCreate>("ws://localhost/?service=Create");

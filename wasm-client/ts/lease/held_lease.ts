@@ -4,7 +4,7 @@
 import { callSafely, ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
 import { Info } from "../object.js";
 import type { Session } from "../session.js";
-import type { CallOptions, Lease, LeaseOptions, LeaseState, RemoteObject } from "../types.js";
+import type { CallOptions, Lease, LeaseOptions, LeaseState, ObjectInfo } from "../types.js";
 
 const Command = { acquire: 0, takeOver: 1, renew: 2, release: 3 } as const;
 const renewalsPerDeadman = 3;
@@ -12,7 +12,7 @@ const defaultDeadman = 1000;
 const defaultCallTimeout = 2000;
 
 /** See lease() of the package. */
-export async function lease(object: RemoteObject, options: LeaseOptions = {}): Promise<Lease> {
+export async function lease(object: { readonly $: ObjectInfo }, options: LeaseOptions = {}): Promise<Lease> {
   const deadman = options.deadman ?? defaultDeadman;
   if (!(deadman >= 50 && deadman <= 60_000)) {
     throw makeError("InvalidArgument", `deadman ${String(deadman)}: expected 50 to 60000 ms`);

@@ -63,7 +63,7 @@ export async function listNodes(usb: WebUsb): Promise<UsbNode[]> {
 }
 
 /** @throws RobotRaconteurError ConnectionError: it is no node, or cannot be asked. */
-export async function describe(usb: WebUsb, device: WebUsbDevice): Promise<UsbNode> {
+export async function describe(usb: WebUsb, device: WebUsbDevice): Promise<UsbNode & { readonly url: string }> {
   if (!mayBeNode(device)) {
     throw makeError(
       "ConnectionError",

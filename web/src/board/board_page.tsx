@@ -35,7 +35,8 @@ import { nameOf, PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
 import { StopButton, useSafe } from "./stop";
 import { UndoBar, useUndo } from "./undo";
-import "../styles/board.css";
+import "./board.css";
+import "../panels/parts.css";
 
 type ServiceRoute = Route & { page: "service" };
 
@@ -316,7 +317,7 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
             {t("Open file")}
           </button>
           <button class="button button-quiet" type="button" onClick={reset}>
-            {t("As at first")}
+            {t("Reset board")}
           </button>
         </>
       )}

@@ -117,7 +117,8 @@ export function PanelFrame({
           <input
             class="field"
             aria-label={t("Object of {0}", name)}
-            placeholder={t("object, such as Webcams[0]")}
+            placeholder={t("object")}
+            title={t("such as Webcams[0]; may be empty")}
             defaultValue={panel.object}
             onChange={(event) => update({ object: event.currentTarget.value.trim() })}
           />

@@ -34,9 +34,10 @@ export function StopButton({ object, stop, place, safe }: StopButtonProps) {
     tellStop();
     return stopWithout(place, safe);
   };
-  const words = stop
-    ? t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`)
-    : t("lets the gateway make it safe: {0}; Esc, too", safe.join(", "));
+  const does = stop
+    ? t("calls {0}", `${stop.call}(${stop.args.join(", ")})`)
+    : t("lets the gateway make it safe: {0}", safe.join(", "));
+  const words = matchMedia("(any-hover: hover)").matches ? t("{0}; or press Esc", does) : does;
   return <StopPress send={send} words={words} label={t("Stop")} byEscape />;
 }
 

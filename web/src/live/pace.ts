@@ -1,22 +1,30 @@
 // How often something comes, and whether what came last is old: after three periods, and within a second at most.
 // Layer: web/live, pure.
 
+import { Rate } from "./rate";
+
 const INTERVALS = 16;
 const PERIODS = 3;
-const BUNCH_MS = 2;
+const BUNCH_MS = 50; // what a busy page hears late, it hears at once
 const SHORTEST_MS = 250; // a hiccup of the page is no old value
 
 export class Pace {
   #heardAt: number | null = null;
+  #bunchAt: number | null = null;
   #count = 0;
   #at = 0;
   readonly #intervals: number[] = [];
+  readonly #rate = new Rate();
 
   /** `now`: milliseconds of a clock that only grows. */
   hear(now: number): void {
-    if (this.#heardAt !== null) {
-      this.#intervals[this.#at] = now - this.#heardAt;
-      this.#at = (this.#at + 1) % INTERVALS;
+    this.#rate.hear(now, this.isStale(now));
+    if (this.#bunchAt === null || now - this.#bunchAt >= BUNCH_MS) {
+      if (this.#bunchAt !== null) {
+        this.#intervals[this.#at] = now - this.#bunchAt;
+        this.#at = (this.#at + 1) % INTERVALS;
+      }
+      this.#bunchAt = now;
     }
     this.#heardAt = now;
     this.#count++;
@@ -30,15 +38,10 @@ export class Pace {
     return this.#heardAt;
   }
 
-  /**
-   * Milliseconds between two, by the middle of the last ones; null before the third. Of those that a busy page hears in bunches, most
-   * have no time between them: then on the average.
-   */
+  /** Milliseconds from bunch to bunch, by the middle of the last ones; null before the third. */
   get periodMs(): number | null {
     const count = this.#intervals.length;
-    if (count < 2) return null;
-    const middle = [...this.#intervals].sort((a, b) => a - b)[count >> 1] ?? 0;
-    return middle >= BUNCH_MS ? middle : this.#intervals.reduce((sum, each) => sum + each, 0) / count;
+    return count < 2 ? null : ([...this.#intervals].sort((a, b) => a - b)[count >> 1] ?? null);
   }
 
   ageMs(now: number): number | null {
@@ -52,9 +55,8 @@ export class Pace {
     return period !== null && age !== null && age > Math.max(SHORTEST_MS, PERIODS * period);
   }
 
-  /** A second. */
+  /** How many come in a second; 0 where nothing regular comes, and before that is known. */
   rate(now: number): number {
-    const period = this.periodMs;
-    return period === null || this.isStale(now) ? 0 : 1000 / Math.max(period, 1);
+    return this.periodMs === null || this.isStale(now) ? 0 : (this.#rate.perSecond ?? 0);
   }
 }

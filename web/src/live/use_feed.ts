@@ -4,6 +4,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Remote } from "../robot/remote";
 import { openFeed } from "./feed";
+import { formatRate } from "./rate";
 import type { Feed, FeedKind, Heard } from "./feed";
 import { span } from "../ui/words";
 import { t } from "../app/language";
@@ -41,7 +42,7 @@ export function useFeed(object: Remote | null, kind: FeedKind | null, member: st
         old.value === next.value &&
         old.failure === next.failure &&
         old.stale === next.stale &&
-        Math.round(old.rate) === Math.round(next.rate)
+        formatRate(old.rate) === formatRate(next.rate)
           ? old
           : next,
       );

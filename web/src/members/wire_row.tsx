@@ -4,8 +4,10 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Plot } from "../chart/plot";
+import { Pace } from "../live/pace";
+import { formatRate } from "../live/rate";
 import { explain } from "../robot/remote";
-import { rateOf, Series } from "../robot/series";
+import { Series } from "../robot/series";
 import { Failure } from "../ui/failure";
 import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
@@ -30,13 +32,13 @@ export function WireRow({ object, member, live }: MemberRowProps) {
 }
 
 function WireReader({ object, name, live }: { object: MemberRowProps["object"]; name: string; live: boolean }) {
-  const arrivals = useMemo(() => new Series(5_000, 5_000), []);
+  const pace = useMemo(() => new Pace(), []);
   const byLabel = useMemo(() => new Map<string, Series>(), []);
   const [labels, setLabels] = useState<readonly string[]>([]);
   const [text, setText] = useState<string | null>(null);
   const [rate, setRate] = useState(0);
   const [failure, setFailure] = useState<string | null>(null);
-  const age = useAge(() => arrivals.newest?.t ?? null);
+  const age = useAge(() => pace.heardAt);
 
   useEffect(() => {
     if (!live) return;
@@ -48,7 +50,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         const now = performance.now();
         newest = value;
         fresh = true;
-        arrivals.push(now, 1);
+        pace.hear(now);
         const readings = readingsOf(value);
         for (const { label, value: number } of readings) {
           const series = byLabel.get(label) ?? new Series();
@@ -63,7 +65,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
     });
     // Values may come a thousand times a second; the text follows ten times.
     const timer = setInterval(() => {
-      setRate(rateOf(arrivals, performance.now()));
+      setRate(pace.rate(performance.now()));
       if (!fresh) return;
       fresh = false;
       setText(formatValue(newest));
@@ -73,7 +75,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
       clearInterval(timer);
       stop.abort();
     };
-  }, [object, name, live, arrivals, byLabel]);
+  }, [object, name, live, pace, byLabel]);
 
   const lines = useMemo(
     () => labels.map((label) => byLabel.get(label)).filter((s) => s !== undefined),
@@ -97,7 +99,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         )}
       </div>
       <p class="note">
-        {rate > 0 ? t("{0} values a second", rate.toFixed(1)) : t("no values in the last 2 s")}
+        {rate > 0 ? t("{0} values a second", formatRate(rate)) : t("no regular values")}
         {age !== null && t("; this one is {0}", age)}
       </p>
       <Failure text={failure} />

@@ -102,9 +102,11 @@ function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {
   const now = useNow(1000);
   return (
     <>
-      {location.host}: {sentence(state.reason)}{" "}
-      <span aria-hidden="true">{t("Away for {0}; asking every 2 s.", span(now - state.since))}</span>
+      {location.host}: {sentence(state.reason)}
       {state.devices && state.devices.length > 0 && ` ${t("Below is what it said last.")}`}
+      <span class="link-since" aria-hidden="true">
+        {t("Away for {0}; asking every 2 s.", span(now - state.since))}
+      </span>
     </>
   );
 }

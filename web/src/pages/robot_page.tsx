@@ -24,6 +24,7 @@ import { SongBox } from "../robot_view/song_box";
 import { ValuesPanel } from "../robot_view/values_panel";
 import { useControl } from "../ui/control_line";
 import { useAge } from "../ui/use_age";
+import "./robot_page.css";
 
 export interface RobotPageProps {
   link: Link;
@@ -34,7 +35,7 @@ export interface RobotPageProps {
   shown: boolean;
 }
 
-export function RobotPage({ link, list, device, service, shown }: RobotPageProps) {
+export default function RobotPage({ link, list, device, service, shown }: RobotPageProps) {
   const state = useStore(link.state);
   const remote = state.kind === "online" ? state.remote : null;
   const reach = openIn(state); // a stop also goes to a robot that is only said to be away

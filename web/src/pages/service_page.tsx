@@ -19,12 +19,12 @@ import { useObject, useWalk } from "../live/links";
 import type { Link } from "../robot/link";
 import type { Remote } from "../robot/remote";
 import type { StopCall } from "../robot/stop";
-import { isCreate } from "../robot/robot_model";
+import { isCreate, isNamedCreate } from "../robot/is_create";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
 import { ReplayBar } from "./replay_bar";
-import { RobotPage } from "./robot_page";
+import type { RobotPageProps } from "./robot_page";
 
 type ServiceRoute = Route & { page: "service" };
 
@@ -57,7 +57,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
       )}
       {drives && link && (
         <div hidden={!isDriven || onlyStop}>
-          <RobotPage link={link} list={list} device={device} service={service} shown={isDriven && !onlyStop} />
+          <LoadedRobot link={link} list={list} device={device} service={service} shown={isDriven && !onlyStop} />
         </div>
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
@@ -156,16 +156,21 @@ function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): 
   return route.path.length === 0 && (isKnown || isMade) ? "board" : "members";
 }
 
-/** The board's code, once a board is looked at. */
-function LoadedBoard(props: BoardPageProps) {
-  const [Shown, setShown] = useState<ComponentType<BoardPageProps> | null>(null);
-  useEffect(() => {
-    import("../board/board_page").then(
-      ({ default: shown }) => setShown(() => shown),
-      () => undefined, // the strip says that the gateway is away
-    );
-  }, []);
-  return Shown && <Shown {...props} />;
+const LoadedBoard = loaded<BoardPageProps>(() => import("../board/board_page"));
+const LoadedRobot = loaded<RobotPageProps>(() => import("./robot_page"));
+
+/** What is loaded once it is looked at. */
+function loaded<Props>(load: () => Promise<{ default: ComponentType<Props> }>): ComponentType<Props> {
+  return (props) => {
+    const [Shown, setShown] = useState<ComponentType<Props> | null>(null);
+    useEffect(() => {
+      load().then(
+        ({ default: shown }) => setShown(() => shown),
+        () => undefined, // the strip says that the gateway is away
+      );
+    }, []);
+    return Shown && <Shown {...props} />;
+  };
 }
 
 /** Whether the gateway knows no such device, and knew none since the page was opened: one that goes away stays shown. */
@@ -203,7 +208,7 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
   const known = devicesOf(gateway)
     ?.find((d) => d.name === device)
     ?.services.find((s) => s.name === service);
-  return /^experimental\.(create\d*\.Create|simulatedcreate\.SimulatedCreate)$/.test(known?.type ?? "");
+  return isNamedCreate(known?.type ?? "");
 }
 
 function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; path: readonly PathStep[] }) {

@@ -59,7 +59,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
           />
         </label>
         <p id="sign-in-hint" class="sign-in-hint">
-          {t("Empty, if you have a token.")}
+          {t("Leave empty to sign in with a token.")}
         </p>
         <label>
           {t("Password or token")}

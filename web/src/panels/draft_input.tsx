@@ -7,6 +7,7 @@ import type { Definitions } from "../values/definitions";
 import { makeDraft, shapeOf } from "../values/draft";
 import type { Draft, Shape } from "../values/draft";
 import { placeholder } from "../values/parse";
+import "./draft_input.css";
 
 export interface DraftInputProps {
   label: string;

@@ -17,6 +17,7 @@ import type { FormDrafts } from "./form_drafts";
 import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
+import "./form_panel.css";
 
 /** One member by choice, or a row of them where the settings name several. */
 export default function FormPanel(props: PanelProps) {
@@ -158,7 +159,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
         )}
       </div>
       {newest && newest.rows.length > 1 && (
-        <table class="values">
+        <table class="value-table">
           <tbody>
             {newest.rows.map((row, i) => (
               <tr key={i}>

@@ -11,6 +11,7 @@ import { Failure } from "../ui/failure";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
+import "./image_panel.css";
 
 const EMPTY = [4, 3] as const;
 

@@ -2,7 +2,6 @@
 
 import type { ComponentChildren } from "preact";
 import { t } from "../app/language";
-import { formatNumber } from "../values/format";
 import { JogButton } from "./jog_button";
 
 export interface JogRowProps {
@@ -41,8 +40,13 @@ export function JogRow(props: JogRowProps) {
       {children}
       {button(t("{0} forward", name), "+", 1)}
       <span class="joint-value">
-        {formatNumber(Number(value.toFixed(digits)))} {unit}
+        {fixed(value, digits)} {unit}
       </span>
     </>
   );
+}
+
+/** Always as many digits, so that a value that changes stays in its place; none is "-0.0000". */
+function fixed(value: number, digits: number): string {
+  return (Number(value.toFixed(digits)) + 0).toFixed(digits);
 }

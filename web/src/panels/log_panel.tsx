@@ -11,6 +11,7 @@ import { Failure } from "../ui/failure";
 import { clockTimeMs } from "../ui/words";
 import { textIn } from "./panel";
 import type { PanelProps } from "./panel";
+import "./log_panel.css";
 
 interface Entry {
   number: number;

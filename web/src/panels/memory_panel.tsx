@@ -11,6 +11,7 @@ import { hexLines, greyPicture } from "./bytes";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
+import "./memory_panel.css";
 
 type View = "array" | "hex" | "image";
 const VIEWS: readonly View[] = ["hex", "array", "image"];

@@ -4,6 +4,7 @@
 import { t } from "../app/language";
 import { textIn } from "./panel";
 import type { PanelProps } from "./panel";
+import "./notes_panel.css";
 
 export default function NotesPanel({ settings, change }: PanelProps) {
   return (

@@ -2,6 +2,7 @@
 // Layer: web/panels.
 
 import { t } from "../app/language";
+import { formatRate } from "../live/rate";
 import type { Look } from "../live/use_feed";
 import type { FeedKind } from "../live/feed";
 import type { Member } from "../robot/remote";
@@ -53,7 +54,7 @@ export function Freshness({ look, isLive }: { look: Look; isLive: boolean }) {
     >
       {words ||
         (look.rate > 0
-          ? t("{0} a second", look.rate.toFixed(look.rate < 10 ? 1 : 0))
+          ? t("{0} a second", formatRate(look.rate))
           : heard > 0
             ? t("no regular values")
             : isLive

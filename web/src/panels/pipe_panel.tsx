@@ -29,6 +29,7 @@ export default function PipePanel(props: PanelProps) {
       <div class="panel-tools">
         <MemberSelect members={choices} chosen={name} choose={(next) => change({ member: next })} />
       </div>
+      {choices.length === 0 && <p class="note">{t("This object has no pipes.")}</p>}
       {receives && <Packets key={name} object={object} name={name} />}
       {member && !member.modifiers.includes("readonly") && (
         <SendForm key={`send ${name}`} {...props} name={name} type={member.type} />

@@ -20,6 +20,7 @@ import { feedKindOf, Freshness, MemberOptions, MemberSelect } from "./parts";
 import { MOST_SOURCES, sharedUnit, sourcesOf, withSources } from "./plot_sources";
 import type { PlotSource } from "./plot_sources";
 import { lonely, measuredAt, Trace, toCsv } from "./trace";
+import "./plot_panel.css";
 
 const DRAW_MS = 100;
 const AT_FIRST = 4;

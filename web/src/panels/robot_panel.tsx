@@ -19,6 +19,7 @@ import type { PanelProps } from "./panel";
 import { Freshness } from "./parts";
 import { coordinateOf, isTurn, TOOL_AXES, toolsOf, velocityAlong } from "./tools";
 import type { Tool, ToolAxis } from "./tools";
+import "./robot_panel.css";
 
 const WIRE = "robot_state";
 

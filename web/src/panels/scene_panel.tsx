@@ -18,6 +18,7 @@ import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
 import { Picture } from "./scene";
+import "./scene_panel.css";
 
 const NO_POINTS = new Float32Array();
 

@@ -7,6 +7,7 @@ import { useNow, useStore } from "../app/store";
 import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
 import { isUsb } from "../gateway/usb_devices";
 import { openFeeds } from "../live/feed";
+import { formatRate } from "../live/rate";
 import { oldness } from "../live/use_feed";
 import type { PanelProps } from "./panel";
 
@@ -22,7 +23,7 @@ export default function StreamsPanel({ place }: PanelProps) {
   const now = performance.now();
   return (
     <div class="panel-scroll" tabIndex={0} role="group" aria-label={t("Streams")}>
-      <table class="values streams">
+      <table class="value-table">
         <thead>
           <tr>
             <th scope="col">{t("Stream")}</th>
@@ -41,7 +42,7 @@ export default function StreamsPanel({ place }: PanelProps) {
                 <th scope="row">
                   {feed.member} <small>{t(feed.kind)}</small>
                 </th>
-                <td>{feed.pace.rate(now).toFixed(1)} / s</td>
+                <td>{t("{0} a second", formatRate(feed.pace.rate(now)))}</td>
                 <td>{age === null ? "–" : oldness(age)}</td>
                 <td>{account.length === 0 ? "–" : t("{0} (all clients)", missed)}</td>
               </tr>

@@ -37,7 +37,7 @@ export default function TablePanel({ object, members, settings, change, definiti
         {asJson ? (
           <pre class="json">{look.value === undefined ? "" : shortJson(look.value)}</pre>
         ) : (
-          <table class="values">
+          <table class="value-table">
             <tbody>
               {rows.map(({ path, depth, name: field, text, note }) => (
                 <tr key={path}>

@@ -20,6 +20,8 @@ import { StickPad } from "./stick";
 import type { StickMoves } from "./stick";
 import { AT_REST, commandOf, Commands, findGamepad, isStickKey, readAxes, readNeutral, STICKS, tell } from "./teleop";
 import type { Axis, Deflection } from "./teleop";
+import "../robot_view/pad.css";
+import "./teleop_panel.css";
 
 const REPEAT_MS = 100;
 

@@ -19,6 +19,7 @@ import type { PanelProps } from "./panel";
 import { Freshness } from "./parts";
 import { MOST_WAYPOINTS, trajectoryThrough, waypointsIn } from "./waypoints";
 import type { Waypoint } from "./waypoints";
+import "./trajectory_panel.css";
 
 const WIRE = "robot_state";
 const PROGRESS = "advanced_robot_state";

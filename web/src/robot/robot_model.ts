@@ -2,6 +2,7 @@
 // Layer: web/robot. Source: experimental.create and create2; what simulatedcreate adds is used when the device has it.
 
 import { Store } from "../app/store";
+import { Pace } from "../live/pace";
 import { Reckoner } from "./reckoning";
 import type { Pose } from "./reckoning";
 import { explain } from "./remote";
@@ -58,8 +59,8 @@ export class RobotModel {
     angle: new Series(),
     leftWheel: new Series(),
     rightWheel: new Series(),
-    packets: new Series(5_000),
   };
+  readonly packetPace = new Pace();
   /** What fails while reading, shown beside the values; null when all is well. */
   readonly trouble = new Store<string | null>(null);
 
@@ -189,7 +190,7 @@ export class RobotModel {
     if (typeof ID !== "number" || !(Data instanceof Uint8Array)) return;
     const now = performance.now();
     const { bumpers, leftWheelMmS, rightWheelMmS } = readSensorPacket(ID, Data);
-    this.series.packets.push(now, Data.length);
+    this.packetPace.hear(now);
     if (leftWheelMmS !== undefined) this.series.leftWheel.push(now, leftWheelMmS);
     if (rightWheelMmS !== undefined) this.series.rightWheel.push(now, rightWheelMmS);
     this.#show({
@@ -245,16 +246,6 @@ export class RobotModel {
 
 export function sideOf(bits: number): string {
   return ["", "right", "left", "both sides"][bits & 3] ?? "";
-}
-
-/** By the members that the page cannot do without. */
-export function isCreate(remote: Remote): boolean {
-  const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
-  return (
-    drive?.parameters.length === 2 &&
-    drive.parameters.every((p) => p.type === "int16") &&
-    remote.has("DistanceTraveled", "property")
-  );
 }
 
 function pause(ms: number, signal: AbortSignal): Promise<void> {

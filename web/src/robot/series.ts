@@ -34,9 +34,3 @@ export class Series {
     return this.#samples[this.#samples.length - 1];
   }
 }
-
-/** Samples per second over the last two seconds before `now`. */
-export function rateOf(series: Series, now: number): number {
-  const recent = series.samples.filter((sample) => sample.t > now - 2000).length;
-  return recent / 2;
-}

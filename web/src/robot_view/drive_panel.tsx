@@ -12,6 +12,7 @@ import type { Driving } from "../robot/use_driving";
 import { ControlLine } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { ArrowIcon } from "../ui/icons";
+import "./pad.css";
 
 export interface DrivePanelProps {
   driver: Driver<DriveCommand>;

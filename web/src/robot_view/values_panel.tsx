@@ -7,7 +7,6 @@ import { useStore } from "../app/store";
 import { Plot } from "../chart/plot";
 import type { RobotModel, Told } from "../robot/robot_model";
 import { sideOf } from "../robot/robot_model";
-import { rateOf } from "../robot/series";
 import { Failure } from "../ui/failure";
 import { useAge } from "../ui/use_age";
 import { formatHex } from "../values/format";
@@ -19,7 +18,7 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
   const { distanceMm, angleDeg, bumpers, leftWheelMmS, rightWheelMmS, packet } = readings;
   const hasWheels = leftWheelMmS !== null || rightWheelMmS !== null;
   const packetsCome = useAge(() => model.heardAt("packet")) === null;
-  const packetRate = packetsCome ? rateOf(series.packets, performance.now()).toFixed(0) : "0";
+  const packetRate = packetsCome ? model.packetPace.rate(performance.now()).toFixed(0) : "0";
   return (
     <section class="panel values" aria-labelledby="values-title">
       <h2 id="values-title">{t("Values")}</h2>

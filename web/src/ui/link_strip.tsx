@@ -74,8 +74,8 @@ function LostDetail({ state, list, device }: DetailProps<LinkState & { kind: "lo
   const why = isUsb(device) ? sentence(state.reason) : reasonOf(state, gateway, device);
   return (
     <>
-      {why}{" "}
-      <span class="nowrap" aria-hidden="true">
+      {why}
+      <span class="link-since" aria-hidden="true">
         {t("Away for {0}; {1}.", span(now - state.since), next)}
       </span>
     </>
