@@ -285,11 +285,11 @@ class Program:
     def start(self):
         first = self.site.tokens.next(1_000_000)
         self.process = Background([sys.executable, PEERS / "chaos_client.py", self._url, first], self.site.folder / f"{self.name}.log")
-        threading.Thread(target=self._read, args=(self.process.process.stdout,), daemon=True).start()
+        threading.Thread(target=self._read, args=(self.process.process,), daemon=True).start()
 
-    def _read(self, output):
+    def _read(self, process):
         findings = self.site.findings
-        for line in iter(output.readline, b""):
+        for line in iter(process.stdout.readline, b""):
             if not line.endswith(b"\n"):
                 return  # killed in the middle of it
             for what, value in json.loads(line).items():
@@ -301,6 +301,8 @@ class Program:
                     findings.last_values[self.name] = value
                 else:
                     findings.break_(self.name, value)
+        if (code := process.wait()) > 0:  # not by a signal
+            findings.break_(self.name, f"has ended with {code}; {self.name}.log says why")
 
     def kill(self):
         self.process.process.kill()
