@@ -113,7 +113,7 @@ std::int32_t generator_index(GeneratorId id) {
 }
 
 Result<GeneratorId> GeneratorTable::add(std::string_view path, const MemberDefinition& function) {
-  if (generators_.size() >= limit_)
+  if (generators_.size() >= limit_ && !forget_ended())
     return make_error(ErrorCode::out_of_system_resource,
                       "this client runs " + std::to_string(limit_) + " generators already, close some");
   std::uint32_t index = 0;
@@ -171,6 +171,19 @@ bool GeneratorTable::finish(GeneratorId id, GeneratorStep step, bool has_failed,
   }
   touch(*entry, now);
   return is_end;
+}
+
+/// The one that ended first makes room: it is kept for late steps alone.
+bool GeneratorTable::forget_ended() {
+  auto first = generators_.end();
+  for (auto entry = generators_.begin(); entry != generators_.end(); ++entry) {
+    const auto& one = entry->second;
+    const bool has_ended = (one.state == State::closed || one.state == State::aborted) && one.steps == 0;
+    if (has_ended && (first == generators_.end() || one.deadline < first->second.deadline)) first = entry;
+  }
+  if (first == generators_.end()) return false;
+  generators_.erase(first);
+  return true;
 }
 
 void GeneratorTable::remove(GeneratorId id) {

@@ -54,7 +54,7 @@ class GeneratorTable {
   explicit GeneratorTable(std::size_t limit) : limit_(limit) {}
 
   /// A generator whose function runs: nobody can step it before opened().
-  /// Errors   out_of_system_resource: as many as may be.
+  /// Errors   out_of_system_resource: as many run as may be.
   Result<GeneratorId> add(std::string_view path, const MemberDefinition& function);
   /// The function has returned: the client may step. Returns false where the generator is gone meanwhile.
   bool opened(GeneratorId id, Now now);
@@ -103,6 +103,7 @@ class GeneratorTable {
   using Entries = std::map<std::int32_t, Entry>;
 
   Entry* find(GeneratorId id);
+  bool forget_ended();
   void touch(Entry& entry, Now now);
   Entries::iterator remove(Entries::iterator entry, std::vector<GeneratorId>& held);
 

@@ -118,6 +118,25 @@ TEST_CASE("a client runs a bounded number of generators") {
   CHECK(script.table.add("arm", script.count).has_value());
 }
 
+TEST_CASE("a generator that has ended is no longer one that the client runs") {
+  Script script;
+  const auto running = script.open();
+  GeneratorId ended = 0;
+  for (int i = 0; i < 10; ++i) {
+    script.now.steady += 1s;
+    ended = script.open();
+    REQUIRE(script.begin(ended, i % 2 == 0 ? GeneratorStep::close : GeneratorStep::abort).has_value());
+    script.table.finish(ended, GeneratorStep::close, false, script.now);
+    CHECK(script.table.size() <= 3);
+  }
+  CHECK(script.begin(running, GeneratorStep::next).has_value());
+  CHECK(script.code(ended) == ErrorCode::operation_aborted);  // the newest are those that a late step may still be for
+  script.open();
+  const auto closing = script.open();
+  REQUIRE(script.begin(closing, GeneratorStep::close).has_value());  // and is not answered yet
+  CHECK(script.table.add("arm", script.count).error().code == ErrorCode::out_of_system_resource);
+}
+
 TEST_CASE("generators that are left alone are forgotten after ten minutes, closed ones after 30 seconds") {
   Script script;
   const auto idle = script.open();
