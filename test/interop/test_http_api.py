@@ -378,7 +378,11 @@ def test_a_trace_goes_into_the_log(tmp_path):
         answer = ask(port, "GET", "/version", headers={"traceparent": parent})
         assert answer.headers["traceparent"] == parent
         assert ask(port, "GET", "/version", headers={"traceparent": "00-nonsense"}).headers["traceparent"] is None
-        lines = [line for line in (tmp_path / "gateway.log").read_text().splitlines() if " call " in line]
+
+        def lines_of_calls():
+            return [line for line in (tmp_path / "gateway.log").read_text().splitlines() if " call " in line]
+        process.wait_until(lines_of_calls)  # they may come behind the answer
+        lines = lines_of_calls()
         assert len(lines) == 1 and f"trace={trace}" in lines[0] and "device=interop" in lines[0]
         assert f"member={BASE}/version" in lines[0] and " us=" in lines[0]
     finally:
