@@ -167,9 +167,10 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
     case EntryType::object_type_name:
       return write_root_type(message, entry);
     case EntryType::connect_client:
-      if (!directory_.find(entry.service_path)) return missing_service(entry.service_path);
-      return connect(directory_.find(entry.service_path), message.header.sender_node_id, message.header.sender_endpoint,
-                     std::nullopt, now);
+      if (auto service = directory_.find(entry.service_path))
+        return connect(std::move(service), message.header.sender_node_id, message.header.sender_endpoint, std::nullopt,
+                       now);
+      return missing_service(entry.service_path);
     case EntryType::connect_client_combined:
       return write_combined(message, entry, now);
     case EntryType::disconnect_client:

@@ -205,4 +205,8 @@ class Loopback {
   }
 };
 
+inline std::string slot(int number) {
+  return "arm.slots[" + std::to_string(number) + "]";
+}
+
 }  // namespace rr::test

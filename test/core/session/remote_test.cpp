@@ -238,14 +238,6 @@ TEST_CASE("what subscriptions had stays counted when they are over") {
   CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{7, 2});
 }
 
-namespace {
-
-std::string slot_of(int client, int number) {
-  return "arm.slots[" + std::to_string(client * 10'000 + number) + "]";
-}
-
-}  // namespace
-
 TEST_CASE("a remote service remembers what clients use of it, however much others look for") {
   Remote pair;
   const auto looked_up = pair.client->find_object("arm.tool", pair.now);
@@ -261,9 +253,9 @@ TEST_CASE("a remote service remembers what clients use of it, however much other
   SECTION("what is found again is used still") {
     pair.find("arm.tool");
   }
-  for (int i = 0; i < 5000; ++i) pair.find(slot_of(0, i));
+  for (int i = 0; i < 5000; ++i) pair.find(slot(i));
   CHECK(pair.hosted().has_object("arm.tool"));
-  CHECK(pair.hosted().has_object(slot_of(0, 4999)));
+  CHECK(pair.hosted().has_object(slot(4999)));
   CHECK(pair.client->send_wire("arm.tool", "force", Value(2.5), pair.now));
   pair.pump();
   CHECK(pair.next_service<WireReceived>().value == Value(2.5));
@@ -277,10 +269,10 @@ TEST_CASE("no client of a remote service takes the paths of all others") {
     if (pair.service->poll_event()) pair.find(path);
     return pair.completion(looked_up);
   };
-  for (int i = 0; i < 5000; ++i) use(slot_of(0, i)).value();
-  for (const auto i : {0, 1023, 4999}) CHECK(pair.hosted().has_object(slot_of(0, i)));
-  CHECK_FALSE(pair.hosted().has_object(slot_of(0, 1024)));
-  CHECK(use(slot_of(0, 1024)));  // one that was forgotten is found again
+  for (int i = 0; i < 5000; ++i) use(slot(i)).value();
+  for (const auto i : {0, 1023, 4999}) CHECK(pair.hosted().has_object(slot(i)));
+  CHECK_FALSE(pair.hosted().has_object(slot(1024)));
+  CHECK(use(slot(1024)));  // one that was forgotten is found again
 }
 
 TEST_CASE("callbacks and refusals of a remote service go ahead of its data") {

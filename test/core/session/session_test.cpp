@@ -367,14 +367,6 @@ TEST_CASE("few paths lead to one object, and all of them are released with it") 
   CHECK(service.forget_path("arm.tools[a%2db%2ec]").empty());
 }
 
-namespace {
-
-std::string slot(int number) {
-  return "arm.slots[" + std::to_string(number) + "]";
-}
-
-}  // namespace
-
 TEST_CASE("a path is remembered while a client uses it; where there is no room, an object is refused") {
   constexpr int room = 4095;  // beside the root
   Loopback pair;
