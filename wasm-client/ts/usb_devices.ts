@@ -14,13 +14,17 @@ export type UsbNode = {
   readonly nodeId: string;
   /** May be empty. */
   readonly nodeName: string;
-  /** "rr+usb:///?nodeid=..."; with "&service=NAME" behind it what connect() takes. Not there where `error` is. */
-  readonly url?: string;
-  /** Why the device could not be asked who it is. */
-  readonly error?: RobotRaconteurError;
 } & (
-  | { readonly url: string; readonly error?: undefined }
-  | { readonly url?: undefined; readonly error: RobotRaconteurError }
+  | {
+      /** "rr+usb:///?nodeid=..."; with "&service=NAME" behind it what connect() takes. Not there where `error` is. */
+      readonly url: string;
+      readonly error?: undefined;
+    }
+  | {
+      readonly url?: undefined;
+      /** Why the device could not be asked who it is. */
+      readonly error: RobotRaconteurError;
+    }
 );
 
 /**

@@ -5,6 +5,7 @@ connects anew whenever it has lost its connection.
 
 Prints lines of JSON: {"answered": token}, {"echoed": count}, {"value": value}, {"broken": what must not be}.
 """
+import contextlib
 import json
 import os
 import sys
@@ -57,9 +58,15 @@ def work(root, tokens):
         say(answered=answer) if answer == token else say(broken=f"call {token} was given the answer {answer}")
 
 
-def is_loss(error):
-    """Of a connection that ends while a member is connected, the package knows no more than "std::exception"."""
-    return isinstance(error, (RR.RobotRaconteurException, RuntimeError)) or str(error) == "std::exception"
+@contextlib.contextmanager
+def until_lost():
+    """Ends with the connection. While a member is connected, the package knows no more of that than "std::exception"."""
+    try:
+        yield
+    except Exception as error:
+        if not isinstance(error, (RR.RobotRaconteurException, RuntimeError)) and str(error) != "std::exception":
+            raise
+        print(error, file=sys.stderr, flush=True)
 
 
 def main():
@@ -74,18 +81,10 @@ def main():
             except RR.RobotRaconteurException:
                 time.sleep(0.2)
                 continue
-            try:
+            with until_lost():
                 work(root, tokens)
-            except Exception as error:
-                if not is_loss(error):
-                    raise
-                print(error, file=sys.stderr, flush=True)
-            try:
+            with until_lost():
                 node.DisconnectService(root)
-            except Exception as error:
-                if not is_loss(error):
-                    raise
-                print(error, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":
