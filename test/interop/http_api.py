@@ -1,6 +1,7 @@
 """Clients of the gateway's HTTP and WebSockets: requests, streams of events, upgrades."""
 import http.client
 import json
+import os
 import pathlib
 import socket
 import subprocess
@@ -128,12 +129,12 @@ def opcodes(data):
 
 def schemathesis(folder, port, document, *more):
     """Every operation of a document with what its schema allows and what it doesn't: no fault, nothing undocumented.
-    `more` are further arguments."""
+    `more` are further arguments. The same requests each time, unless RRGATE_SEED names others."""
     program = pathlib.Path(sys.executable).parent / "schemathesis"
     checks = "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance"
     run = subprocess.run(
         [program, "run", f"http://127.0.0.1:{port}{document}", "--url", f"http://127.0.0.1:{port}", "--checks", checks,
-         "--max-examples", "20", "--no-color", *more], cwd=folder, capture_output=True, text=True, timeout=100)
+         "--max-examples", "20", "--seed", os.environ.get("RRGATE_SEED", "1"), "--no-color", *more], cwd=folder, capture_output=True, text=True, timeout=100)
     # A request may be long: why it failed stands before it.
     assert run.returncode == 0, "\n".join(line[:300] for line in run.stdout.splitlines()[-120:]) + run.stderr[-2000:]
     return run.stdout

@@ -327,6 +327,9 @@ def test_gateway_and_device_keep_what_their_openapi_says(tmp_path):
         whole = ask(port, "GET", "/api/v1/openapi.json", base="").json
         operations = sum(len(item.keys() - {"parameters"}) for item in whole["paths"].values())
         assert f" {operations - 1} selected" in schemathesis(tmp_path, port, "/api/v1/openapi.json")  # all but itself
+        longest = "/api/v1/audit?limit=" + "9" * 9000
+        assert ask(port, "GET", longest, base="").status == 431
+        assert "431" in whole["paths"]["/api/v1/audit"]["get"]["responses"]
         assert whole["tags"] == [{"name": "interop", "externalDocs": {"url": "/api/v1/devices/interop/openapi.json"}}]
         paths = ask(port, "GET", whole["tags"][0]["externalDocs"]["url"], base="").json["paths"]
         told = [operation["description"] for item in paths.values() for operation in item.values() if "description" in operation]

@@ -7,11 +7,27 @@
 
 namespace rrgate {
 
+namespace {
+
+/// What every operation may answer before anybody knows that it is meant: no request, or too large or too slow a one,
+/// or one for another host.
+void tell_unreadable(rr::OrderedJson& paths) {
+  for (auto& item : paths)
+    for (auto& operation : item) {
+      if (!operation.contains("responses")) continue;  // the parameters of a path
+      for (const auto* status : {"400", "408", "413", "421", "431", "501"})
+        operation["responses"].emplace(status, rr::OrderedJson{{"$ref", "#/components/responses/Unreadable"}});
+    }
+}
+
+}  // namespace
+
 Handler gateway_document_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     auto out = rr::OrderedJson::parse(gateway_openapi);
     const auto& prefix = request.arrival.prefix;
     out["servers"] = rr::OrderedJson::array({{{"url", prefix.empty() ? "/" : prefix}}});
+    tell_unreadable(out["paths"]);
     auto& tags = out["tags"] = rr::OrderedJson::array();
     for (const auto& device : gateway.devices().all()) {
       const auto& name = device->config().name;
