@@ -32,17 +32,18 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
     if (decoder_.received_close()) co_return ReadResult{};
     const auto read = co_await inner_->read_some(into);
     if (read.error || read.is_end()) co_return read;
-    const auto payload = decoder_.decode(into.first(read.bytes));
-    if (!payload) {
+    error_code violation;
+    const auto payload = decoder_.decode(into.first(read.bytes), violation);
+    if (violation) {
       takes_close_ = true;  // whoever sends such frames is not a native peer, and this connection ends anyway
-      violation_ = EndReason{decoder_.close_code(), payload.error().message};
-      co_return ReadResult{boost::system::errc::make_error_code(boost::system::errc::protocol_error), 0};
+      violation_ = EndReason{decoder_.close_code(), violation.message()};
+      co_return ReadResult{violation, 0};
     }
     if (auto ping = decoder_.take_ping()) {
       auto pong = make_control_frame(role_, WebSocketOpcode::pong, *ping);
       if (const auto error = co_await write_control(std::move(pong)); error) co_return ReadResult{error, 0};
     }
-    if (*payload > 0) co_return ReadResult{{}, *payload};
+    if (payload > 0) co_return ReadResult{{}, payload};
   }
 }
 

@@ -35,21 +35,47 @@ bool is_sendable_code(std::uint16_t code) {
          (code >= 3000 && code <= 4999);
 }
 
+class WebSocketCategory final : public boost::system::error_category {
+ public:
+  const char* name() const noexcept override { return "rr.websocket"; }
+  std::string message(int value) const override {
+    switch (static_cast<WebSocketViolation>(value)) {
+      case WebSocketViolation::reserved_bits:
+        return "WebSocket: reserved bits are set, but no extension was agreed on";
+      case WebSocketViolation::text_frame:
+        return "WebSocket: text frame; expected binary frames";
+      case WebSocketViolation::reserved_opcode:
+        return "WebSocket: frame with a reserved opcode";
+      case WebSocketViolation::no_mask:
+        return "WebSocket: frame of a client without mask";
+      case WebSocketViolation::frame_length:
+        return "WebSocket: frame length with its highest bit set";
+      case WebSocketViolation::control_frame:
+        return "WebSocket: control frame that is fragmented or longer than 125 bytes";
+    }
+    return "WebSocket: unknown violation";
+  }
+};
+
 }  // namespace
 
-Error WebSocketDecoder::fail(std::uint16_t code, std::string what) {
-  close_code_ = code;
-  return protocol_error("WebSocket: " + std::move(what));
+boost::system::error_code make_error_code(WebSocketViolation violation) {
+  static const WebSocketCategory category;
+  return {static_cast<int>(violation), category};
 }
 
-Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) {
+std::size_t WebSocketDecoder::decode(std::span<std::uint8_t> bytes, boost::system::error_code& error) {
   std::size_t out = 0;
   std::size_t in = 0;
   while (in < bytes.size() && !close_) {
     if (!in_payload_) {
       header_[header_size_++] = bytes[in++];
       if (header_size_ < 2 || header_size_ < header_length(header_[1])) continue;
-      if (auto begun = begin_frame(); !begun) return begun.error();
+      if (const auto violation = begin_frame()) {
+        if (violation == WebSocketViolation::text_frame) close_code_ = 1003;
+        error = *violation;
+        return out;
+      }
       if (left_ == 0 && is_control(opcode_)) end_control();
       continue;
     }
@@ -72,10 +98,10 @@ Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) {
   return out;
 }
 
-Result<> WebSocketDecoder::begin_frame() {
+std::optional<WebSocketViolation> WebSocketDecoder::begin_frame() {
   header_size_ = 0;
   const bool is_final = (header_[0] & 0x80) != 0;
-  if ((header_[0] & 0x70) != 0) return fail(1002, "reserved bits are set, but no extension was agreed on");
+  if ((header_[0] & 0x70) != 0) return WebSocketViolation::reserved_bits;
   opcode_ = static_cast<WebSocketOpcode>(header_[0] & 0x0f);
   switch (opcode_) {
     case WebSocketOpcode::continuation:
@@ -85,24 +111,24 @@ Result<> WebSocketDecoder::begin_frame() {
     case WebSocketOpcode::pong:
       break;
     case WebSocketOpcode::text:
-      return fail(1003, "text frame; expected binary frames");
+      return WebSocketViolation::text_frame;
     default:
-      return fail(1002, "opcode " + std::to_string(header_[0] & 0x0f) + " is reserved");
+      return WebSocketViolation::reserved_opcode;
   }
   const bool is_masked = (header_[1] & 0x80) != 0;
-  if (!is_masked && role_ == WebSocketRole::server) return fail(1002, "frame of a client without mask");
+  if (!is_masked && role_ == WebSocketRole::server) return WebSocketViolation::no_mask;
   std::size_t at = 0;
   left_ = read_frame_length(header_, at);
-  if (left_ > INT64_MAX) return fail(1002, "frame length with its highest bit set");
+  if (left_ > INT64_MAX) return WebSocketViolation::frame_length;
   if (is_control(opcode_)) {
-    if (!is_final || left_ > 125) return fail(1002, "control frame that is fragmented or longer than 125 bytes");
+    if (!is_final || left_ > 125) return WebSocketViolation::control_frame;
     control_.clear();
   }
   mask_ = {};
   if (is_masked) std::memcpy(mask_.data(), header_.data() + at, 4);
   mask_index_ = 0;
   in_payload_ = left_ != 0;
-  return {};
+  return std::nullopt;
 }
 
 void WebSocketDecoder::end_control() {

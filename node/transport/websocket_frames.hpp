@@ -6,11 +6,13 @@
 #pragma once
 
 #include <array>
+#include <boost/system/error_code.hpp>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "core/support/bytes.hpp"
@@ -28,6 +30,17 @@ inline constexpr std::string_view websocket_subprotocol = "robotraconteur.robotr
 /// The largest payload of one frame that native peers take for sure.
 inline constexpr std::size_t max_frame_payload = 65535;
 
+/// What a peer sent against RFC 6455, or against the binary frames of Robot Raconteur.
+enum class WebSocketViolation {
+  reserved_bits = 1,
+  text_frame,
+  reserved_opcode,
+  no_mask,
+  frame_length,
+  control_frame,
+};
+boost::system::error_code make_error_code(WebSocketViolation violation);
+
 using WebSocketMask = std::array<std::uint8_t, 4>;
 
 /// What a close frame said. `code` is 1005 when it said nothing.
@@ -43,9 +56,8 @@ class WebSocketDecoder {
   /// Turns received bytes into payload, in place: afterwards the first n bytes of `bytes` are payload, unmasked.
   /// Stops at a close frame; what follows it is dropped.
   /// Returns  n; 0 when the bytes held no payload.
-  /// Errors   protocol_error: reserved bits or opcodes, a text frame, a client's frame without mask, a control
-  ///          frame that is fragmented or longer than 125 bytes. close_code() then has the code to close with.
-  [[nodiscard]] Result<std::size_t> decode(std::span<std::uint8_t> bytes);
+  /// Errors   a WebSocketViolation. close_code() then has the code to close with.
+  [[nodiscard]] std::size_t decode(std::span<std::uint8_t> bytes, boost::system::error_code& error);
 
   /// Payload of the newest ping that was not yet taken; it is to be answered by a pong with the same bytes.
   std::optional<Bytes> take_ping();
@@ -55,9 +67,8 @@ class WebSocketDecoder {
   std::uint16_t close_code() const { return close_code_; }
 
  private:
-  Result<> begin_frame();
+  std::optional<WebSocketViolation> begin_frame();
   void end_control();
-  Error fail(std::uint16_t code, std::string what);
 
   WebSocketRole role_;
   std::array<std::uint8_t, 14> header_{};
@@ -130,3 +141,6 @@ class FrameSplitter {
 std::string websocket_accept(std::string_view key);
 
 }  // namespace rr
+
+template <>
+struct boost::system::is_error_code_enum<rr::WebSocketViolation> : std::true_type {};

@@ -33,9 +33,10 @@ rr::Bytes operator+(rr::Bytes left, const rr::Bytes& right) {
 }
 
 std::string decoded(WebSocketDecoder& decoder, rr::Bytes bytes) {
-  const auto size = decoder.decode(bytes);
-  REQUIRE(size.has_value());
-  return std::string(rr::as_text(rr::ByteSpan(bytes).first(*size)));
+  boost::system::error_code error;
+  const auto size = decoder.decode(bytes, error);
+  REQUIRE_FALSE(error);
+  return std::string(rr::as_text(rr::ByteSpan(bytes).first(size)));
 }
 
 std::string text_of(std::size_t size) {
@@ -95,19 +96,22 @@ TEST_CASE("a close frame without a code is 1005") {
 }
 
 TEST_CASE("what RFC 6455 forbids is an error with its code") {
-  const auto refuses = [](rr::Bytes bytes, std::uint16_t code) {
+  const auto refuses = [](rr::Bytes bytes, WebSocketViolation violation, std::uint16_t code) {
     WebSocketDecoder decoder(WebSocketRole::server);
-    CHECK_FALSE(decoder.decode(bytes).has_value());
+    boost::system::error_code error;
+    decoder.decode(bytes, error);
+    CHECK(error == violation);
     CHECK(decoder.close_code() == code);
   };
-  refuses(frame(0x81, "text"), 1003);
-  refuses(frame(0xc2, "compressed"), 1002);
-  refuses(frame(0x83, "reserved"), 1002);
-  refuses(frame(0x8b, "reserved"), 1002);
-  refuses(frame(0x82, "plain", 0, false), 1002);
-  refuses(frame(0x09, "fragmented ping"), 1002);
-  refuses(frame(0x89, std::string(126, 'x')), 1002);
-  refuses({0x82, 0xff, 0x80, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4}, 1002);
+  refuses(frame(0x81, "text"), WebSocketViolation::text_frame, 1003);
+  refuses(frame(0xc2, "compressed"), WebSocketViolation::reserved_bits, 1002);
+  refuses(frame(0x83, "reserved"), WebSocketViolation::reserved_opcode, 1002);
+  refuses(frame(0x8b, "reserved"), WebSocketViolation::reserved_opcode, 1002);
+  refuses(frame(0x82, "plain", 0, false), WebSocketViolation::no_mask, 1002);
+  refuses(frame(0x09, "fragmented ping"), WebSocketViolation::control_frame, 1002);
+  refuses(frame(0x89, std::string(126, 'x')), WebSocketViolation::control_frame, 1002);
+  refuses({0x82, 0xff, 0x80, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4}, WebSocketViolation::frame_length, 1002);
+  CHECK(make_error_code(WebSocketViolation::no_mask).message() == "WebSocket: frame of a client without mask");
 }
 
 TEST_CASE("unmask works at every alignment and in place") {
