@@ -5,6 +5,7 @@ import { enumName, flagNames } from "./definitions";
 import type { Definitions } from "./definitions";
 import { formatUuid, uuidBytes } from "./draft";
 import { formatValue } from "./format";
+import { timeText } from "./times";
 import { parseType } from "./type_text";
 import { unitOf } from "./units";
 
@@ -42,19 +43,25 @@ function add(rows: Row[], value: unknown, of: Of, path: string, name: string, no
     parsed && parsed.array === "none" && parsed.container === "none"
       ? of.definitions.struct(parsed.base, of.scope)
       : undefined;
-  const isUuid = struct?.name === "com.robotraconteur.uuid.UUID";
-  if (struct && !isUuid && value !== null && typeof value === "object" && depth < MOST_DEPTH) {
+  const fields = struct && value !== null && typeof value === "object" ? value : undefined;
+  const whole = struct && fields && wholeText(struct.name, fields);
+  if (struct && fields && whole === undefined && depth < MOST_DEPTH) {
     if (path !== "") rows.push({ path, depth, name, text: "", note });
     for (const field of struct.fields) {
       const next = { ...of, type: field.type, scope: struct.scope };
       const at = path === "" ? field.name : `${path}.${field.name}`;
-      const held = Object.hasOwn(value, field.name) ? (value as Record<string, unknown>)[field.name] : undefined;
+      const held = Object.hasOwn(fields, field.name) ? (fields as Record<string, unknown>)[field.name] : undefined;
       add(rows, held, next, at, field.name, field.documentation, depth + (path === "" ? 0 : 1));
     }
     return;
   }
-  const uuid = isUuid ? formatUuid(uuidBytes(value)) : "";
-  rows.push({ path, depth, name, text: uuid || words(value, of, path, name), note });
+  rows.push({ path, depth, name, text: whole ?? words(value, of, path, name), note });
+}
+
+/** A struct whose fields say less than the whole. */
+function wholeText(struct: string, value: object): string | undefined {
+  if (struct === "com.robotraconteur.uuid.UUID") return formatUuid(uuidBytes(value)) || undefined;
+  return timeText(struct, value);
 }
 
 function words(value: unknown, of: Of, path: string, name: string): string {
