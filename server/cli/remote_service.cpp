@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <optional>
 
 #include "node/tls/base64.hpp"
 #include "server/cli/printable.hpp"
@@ -55,6 +56,19 @@ int exit_code_of(rr::ErrorCode code) {
 bool is_refusal(std::string_view text) {
   return text.find("refused with status 401") != std::string_view::npos ||
          text.find("refused with status 403") != std::string_view::npos;
+}
+
+/// What the dashboard shows at ".../#/devices/NAME/SERVICE" is at ".../devices/NAME?service=SERVICE".
+std::optional<std::string> service_of_page(std::string_view url) {
+  constexpr std::string_view mark = "#/devices/";
+  const auto at = url.find(mark);
+  if (at == std::string_view::npos) return std::nullopt;
+  auto path = url.substr(at + mark.size());
+  path = path.substr(0, path.find('?'));
+  const auto slash = path.find('/');
+  if (slash == std::string_view::npos || path.find('/', slash + 1) != std::string_view::npos) return std::nullopt;
+  return gateway_base(url) + "/devices/" + std::string(path.substr(0, slash)) +
+         "?service=" + std::string(path.substr(slash + 1));
 }
 
 std::string member_names(const rr::EntityDefinition& type) {
@@ -129,7 +143,10 @@ rr::RemoteObject open_service(const RemoteAddress& address) {
 
 std::string gateway_url(std::string_view url) {
   for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
-    if (url.starts_with(web)) return native + std::string(url.substr(std::string_view(web).size()));
+    if (url.starts_with(web)) {
+      auto out = native + std::string(url.substr(std::string_view(web).size()));
+      return service_of_page(out).value_or(out);
+    }
   return {};
 }
 

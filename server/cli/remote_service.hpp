@@ -48,8 +48,8 @@ struct RemoteAddress {
   std::chrono::milliseconds timeout{10'000};
 };
 
-/// Of a Robot Raconteur URL, or of a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE", where the login is
-/// the gateway's. Throws   NotUnderstood.
+/// Of a Robot Raconteur URL, or of a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE" or the dashboard's
+/// "http(s)://HOST:PORT/#/devices/NAME/SERVICE", where the login is the gateway's. Throws   NotUnderstood.
 RemoteAddress remote_address(const RemoteOptions& options);
 rr::RemoteObject open_service(const RemoteAddress& address);
 /// "rr+ws://h:1/devices/arm?service=Arm" of "http://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.

@@ -158,6 +158,9 @@ def test_locks_of_a_gateways_device_are_told(node, tmp_path):
         site.node.RequestObjectLock(arm, RR.RobotRaconteurObjectLockFlags_USER_LOCK)
         assert locks("tools/0") == [{"path": "guarded", "kind": "user", "user": "alice"}]
         assert "  lock guarded: user alice\n" in run("info", url)
+        page = f"http://127.0.0.1:{site.port}/#/devices/interop/guarded"  # what a browser shows there
+        for address in (page, page + "?view=board"):
+            assert "  lock guarded: user alice\n" in run("info", address)
         assert "locks" not in json.loads(run("info", site.url.split("?")[0] + "?service=plain", "--json"))
     finally:
         site.stop()
