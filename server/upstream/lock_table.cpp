@@ -93,7 +93,6 @@ void LockTable::remove(LockClient client, rr::TimePoint now) {
     std::erase_if(monitor.queue, [&](const Waiting& waiting) { return waiting.client == client; });
     if (monitor.owner != client) continue;
     if (party.has_own_session && monitor.asking == Asking::nothing) {
-      monitor.owner = 0;
       hand_on(at, now);
     } else {
       take_back_monitor(monitor, client);
@@ -377,7 +376,6 @@ void LockTable::begin_entering(Monitor& monitor, const Waiting& waiting, rr::Tim
   monitor.by = party.user;
   monitor.path = waiting.path;
   monitor.request = waiting.request;
-  monitor.leaver = 0;
   const auto left = waiting.deadline == rr::TimePoint::max()
                         ? std::chrono::milliseconds(-1)
                         : std::chrono::ceil<std::chrono::milliseconds>(waiting.deadline - now);

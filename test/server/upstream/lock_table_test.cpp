@@ -145,6 +145,9 @@ TEST_CASE("an object has one lock however its path is written") {
   for (const auto* path : {"s.tools[01]", "s.tools[%2b1]", "s.tools[%2B001]"})
     CHECK(canonical_lock_path(path) == "s.tools[1]");
   CHECK(canonical_lock_path("s.tools[-01].x") == canonical_lock_path("s.tools[-1].x"));
+  for (const auto* path : {"s.tools[0]", "s.tools[00]", "s.tools[-0]"})
+    CHECK(canonical_lock_path(path) == "s.tools[0]");
+  CHECK(canonical_lock_path("s.tools[%2b]") == "s.tools[%2b]");
   CHECK(canonical_lock_path("s.tools[10]") != canonical_lock_path("s.tools[1]"));
   CHECK(canonical_lock_path("s.named[a%2Eb]") == canonical_lock_path("s.named[a%2eb]"));
   Transcript t;
@@ -462,6 +465,60 @@ TEST_CASE("so many clients can wait for a monitor, and so many objects can be mo
     t.takes(owner, LockCommand::enter_monitor, shared, "s.parts[" + std::to_string(i) + "]");
   t.wants(owner, LockCommand::enter_monitor, "s.one_more");
   t.answered(owner, ErrorCode::out_of_system_resource);
+}
+
+TEST_CASE("who has had enough while the device is asked for a monitor leaves others theirs") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.wants(first, LockCommand::enter_monitor);
+  const auto ask = t.asked(LockCommand::enter_monitor);
+  t.wants(second, LockCommand::exit_monitor);
+  t.answered(second, ErrorCode::invalid_operation);
+  t.nothing_more();
+  t.wants(first, LockCommand::exit_monitor);
+  t.answered(first, ErrorCode::invalid_operation);
+  t.answered(first, ErrorCode::invalid_operation);  // its entering
+  t.device_says(ask);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  CHECK(t.may(second));
+  CHECK(t.table.is_empty());
+  t.nothing_more();
+}
+
+TEST_CASE("a monitor of a client with a session of its own ends with it, and goes to the next") {
+  Transcript t;
+  const auto owner = t.has_own(1, "alice", alices), waiting = t.shares(2);
+  t.takes(owner, LockCommand::enter_monitor, alices);
+  t.wants(waiting, LockCommand::enter_monitor);
+  t.nothing_more();
+  t.table.remove(owner, t.now);
+  const auto ask = t.asked(LockCommand::enter_monitor);
+  t.left(owner);
+  t.device_says(ask);
+  t.answered(waiting);
+  CHECK(t.may(waiting));
+}
+
+TEST_CASE("a session that is lost takes no monitor of another with it") {
+  Transcript t;
+  const auto alice = t.has_own(1, "alice", alices), other = t.shares(2);
+  t.takes(alice, LockCommand::enter_monitor, alices);
+  t.table.handle_lost(shared, t.now);
+  CHECK(t.may(alice));
+  CHECK(t.use(other) == ErrorCode::invalid_operation);
+  t.nothing_more();
+}
+
+TEST_CASE("an idle owner has lost its monitor in that moment, also where nobody waits") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.takes(first, LockCommand::enter_monitor);
+  t.now += seconds(25) - milliseconds(1);
+  CHECK_FALSE(t.may(second));
+  t.now += milliseconds(1);
+  CHECK(t.may(second));
+  CHECK_FALSE(t.may(first));
+  t.asked(LockCommand::exit_monitor);
 }
 
 TEST_CASE("the owner of a monitor who is idle has lost it, and is told") {
