@@ -19,7 +19,12 @@ namedarray Vector3
   field double y
   field double z
 end
+struct Wide
+${Array.from({ length: 1100 }, (_, index) => `  field double f${index}`).join("\n")}
+  field double ${"long".repeat(20)}
+end
 object Root
+  property Wide wide
   property State state
   property Vector3 position
   property Vector3[] path
@@ -112,4 +117,13 @@ it("crosses twice for a value of a wire", async () => {
     ["poll_event", "build"],
     ["poll_event", "build"],
   ]);
+});
+
+it("reads names beyond those that it remembers, and long ones", async () => {
+  const wide = Object.fromEntries(Array.from({ length: 1100 }, (_, index) => [`f${index}`, index]));
+  wide["long".repeat(20)] = -1;
+  await robot["wide"]!.set(wide);
+  for (let i = 0; i < 2; ++i) expect(await robot["wide"]!.get()).toEqual(wide);
+  await robot["state"]!.set(state);
+  expect(await robot["state"]!.get()).toEqual(state);
 });
