@@ -170,9 +170,9 @@ int robdef(const RemoteOptions& options) {
 
 void add_info(Commands& commands) {
   const auto [app, options] = commands.add("info", "Describe an object or a recording", info);
-  app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it, or a file of \"rrgate record\"")
-      ->required()
-      ->option_text(" ");
+  auto* const url =
+      app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it, or a file of \"rrgate record\"");
+  takes_websocket_url(url)->required()->option_text(" ");
   app.add_option("OBJECT", options.object, "Path of an object or member; default: the root object")->option_text(" ");
   add_json(app, options);
   add_connection_options(app, options);

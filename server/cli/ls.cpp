@@ -242,7 +242,8 @@ std::vector<std::string> list_service_urls(const RemoteOptions& where, const std
 
 void add_ls(Commands& commands) {
   const auto [app, options] = commands.add("ls", "List services: on the network, of a node, of a gateway", ls);
-  app.add_option("URL", options.url, "A node, or a gateway's http(s)://HOST:PORT")->option_text(" ");
+  takes_websocket_url(app.add_option("URL", options.url, "A node, or a gateway's http(s)://HOST:PORT"))
+      ->option_text(" ");
   app.add_option("--type", options.type, "Services whose root object is of this type, or implements it")
       ->option_text("TYPE");
   add_count(app, "--wait", options.wait, "How long to listen for nodes, in s")->option_text("SECONDS [2]");

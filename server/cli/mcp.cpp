@@ -176,8 +176,10 @@ void add_mcp(Commands& commands) {
   const auto [app, options] = commands.add(
       "mcp", "Give a language model devices by standard input and output (Model Context Protocol)", run_mcp);
   options.url = "http://127.0.0.1:8080";
-  app.add_option("URL", options.url,
-                 "A gateway's http(s)://HOST:PORT, for all that it lets the login do; or a service, to be read alone")
+  takes_websocket_url(
+      app.add_option(
+          "URL", options.url,
+          "A gateway's http(s)://HOST:PORT, for all that it lets the login do; or a service, to be read alone"))
       ->option_text("[http://127.0.0.1:8080]");
   app.add_option("--name", options.name, "Of the device, without a gateway; the service's without it")
       ->option_text("NAME");

@@ -203,9 +203,10 @@ CLI::Option* add_positive(CLI::App& app, const std::string& name, double& number
 
 void add_record(Commands& commands) {
   const auto [app, options] = commands.add("record", "Record the data of services", run_record);
-  app.add_option(
-         "URL", options.urls,
-         "Services, as \"rrgate ls\" prints them, or a gateway's http(s)://HOST:PORT/devices/NAME for a whole device")
+  takes_websocket_url(
+      app.add_option(
+          "URL", options.urls,
+          "Services, as \"rrgate ls\" prints them, or a gateway's http(s)://HOST:PORT/devices/NAME for a whole device"))
       ->option_text("...");
   app.add_option("--type", options.type,
                  "Record the services of this type, or that implement it, of the URLs' nodes and gateways; without "

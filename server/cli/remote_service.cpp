@@ -84,7 +84,15 @@ std::string read_all(std::istream& in) {
 }  // namespace
 
 CLI::Option* add_url(CLI::App& app, RemoteOptions& options) {
-  return app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it")->option_text(" ");
+  auto* const option = app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it");
+  return takes_websocket_url(option)->option_text(" ");
+}
+
+CLI::Option* takes_websocket_url(CLI::Option* option) {
+  return option->transform([](const std::string& url) {
+    const bool is_page_url = url.starts_with("ws://") || url.starts_with("wss://");
+    return is_page_url ? "http" + url.substr(2) : url;
+  });
 }
 
 void add_connection_options(CLI::App& app, RemoteOptions& options) {

@@ -34,6 +34,8 @@ struct RemoteOptions {
 };
 
 CLI::Option* add_url(CLI::App& app, RemoteOptions& options);
+/// The option's URL may begin with ws or wss, as those that pages connect to: it is read as http or https.
+CLI::Option* takes_websocket_url(CLI::Option* option);
 /// --user, --timeout.
 void add_connection_options(CLI::App& app, RemoteOptions& options);
 CLI::Option* add_json(CLI::App& app, RemoteOptions& options);

@@ -169,7 +169,8 @@ int top(const TopOptions& options) {
 void add_top(Commands& commands) {
   const auto [app, options] = commands.add("top", "Show the devices and clients of a gateway", top);
   options.url = "http://127.0.0.1:8080";
-  app.add_option("GATEWAY", options.url, "The gateway, as http(s)://HOST:PORT")->option_text("[http://127.0.0.1:8080]");
+  takes_websocket_url(app.add_option("GATEWAY", options.url, "The gateway, as http(s)://HOST:PORT"))
+      ->option_text("[http://127.0.0.1:8080]");
   add_count(app, "--count", options.count, "Stop after this number of seconds");
   add_json(app, options);
   add_connection_options(app, options);

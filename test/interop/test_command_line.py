@@ -417,6 +417,18 @@ def test_services_are_listed(reynard, url):
         assert (found["node"], found["service"], found["url"]) == ("fox", "reynard", url)
 
 
+def test_urls_may_begin_as_pages_write_them(guarded, tmp_path):
+    admin = {"environment": {"RRGATE_PASSWORD": PASSWORDS["alice"]}}
+    page = guarded.replace("http:", "ws:")
+    base = page.split("/devices/")[0]
+    assert run("get", page, "color", "--user", "alice", **admin).startswith("[")
+    assert json.loads(run("info", page, "--json", "--user", "alice", **admin))
+    assert json.loads(run("ls", base, "--json", "--user", "alice", **admin))["url"] == guarded
+    shown = json.loads(run("top", base, "--count", "1", "--json", "--user", "alice", **admin))
+    assert [each["device"] for each in shown["devices"]] == ["fox"]
+    run("record", page, "-o", tmp_path / "fox.mcap", "--duration", "1", "--user", "alice", **admin)
+
+
 def test_mistakes_are_one_sentence(url):
     assert Ran(["get", url, "colour"]).refused(NOT_UNDERSTOOD, "no member 'colour'", "it has: ", "color")
     assert Ran(["get", url, "teleport"]).refused(NOT_UNDERSTOOD, "'teleport' is a function", "property")

@@ -5,7 +5,7 @@ import { mustSignIn, proofOf, readWho } from "../../web/src/gateway/session";
 import { readFrame } from "../../web/src/camera/frame";
 import type { Frame } from "../../web/src/camera/frame";
 import { fit, gridStep, include, START, toCanvas } from "../../web/src/chart/view";
-import { sentence, span, staleAge } from "../../web/src/ui/words";
+import { ended, sentence, span, staleAge } from "../../web/src/ui/words";
 
 describe("access", () => {
   it("reads who the gateway takes the page for", () => {
@@ -179,8 +179,15 @@ describe("words", () => {
     expect(span(-5)).toBe("0 s");
   });
   it("end sentences once", () => {
-    expect(sentence("refused")).toBe("refused.");
-    expect(sentence("refused. ")).toBe("refused.");
+    expect(ended("refused")).toBe("refused.");
+    expect(ended("refused. ")).toBe("refused.");
+  });
+  it("begin sentences with a capital, but change no names", () => {
+    expect(sentence("refused")).toBe("Refused.");
+    expect(sentence("user 'vera' has no right")).toBe("User 'vera' has no right.");
+    expect(sentence("can't be reached, and so on")).toBe("Can't be reached, and so on.");
+    for (const text of ["rr+tcp://h:1/ refused.", "gateway.json: broken.", "'arm' is away.", "create: no answer."])
+      expect(sentence(text)).toBe(text);
   });
 });
 

@@ -25,20 +25,6 @@ RR_JS(type_mark) JsHandle rr_js_type_mark(JsHandle value);
 RR_JS(copy_items) void rr_js_copy_items(JsHandle value, void* to);
 RR_JS(read_numbers) int rr_js_read_numbers(JsHandle value, double* to, std::size_t count);
 RR_JS(read_booleans) int rr_js_read_booleans(JsHandle value, std::uint8_t* to, std::size_t count);
-
-RR_JS(make_text) JsHandle rr_js_make_text(const char* text, std::size_t length);
-RR_JS(make_number) JsHandle rr_js_make_number(double value);
-RR_JS(make_bigint) JsHandle rr_js_make_bigint(const void* bytes, int is_unsigned);
-RR_JS(make_items) JsHandle rr_js_make_items(int type, const void* bytes, std::size_t length);
-RR_JS(make_booleans) JsHandle rr_js_make_booleans(const void* bytes, std::size_t length);
-RR_JS(make_parts) JsHandle rr_js_make_parts(int type, const void* bytes, std::size_t count, int part);
-RR_JS(make_object) JsHandle rr_js_make_object();
-RR_JS(make_array) JsHandle rr_js_make_array();
-RR_JS(make_map) JsHandle rr_js_make_map();
-RR_JS(set_field) void rr_js_set_field(JsHandle object, const char* name, std::size_t length, JsHandle value);
-RR_JS(push) void rr_js_push(JsHandle array, JsHandle value);
-RR_JS(set_key) void rr_js_set_key(JsHandle map, JsHandle key, JsHandle value);
-RR_JS(mark_type) void rr_js_mark_type(JsHandle object, const char* name, std::size_t length);
 }
 
 namespace rr {
@@ -161,52 +147,6 @@ std::string_view JsValue::kind_text() const {
       break;
   }
   return "something that is no value";
-}
-
-JsValue make_js_text(std::string_view text) {
-  return JsValue(rr_js_make_text(text.data(), text.size()));
-}
-JsValue make_js_number(double value) {
-  return JsValue(rr_js_make_number(value));
-}
-JsValue make_js_boolean(bool value) {
-  return JsValue(value ? JsHandle::yes : JsHandle::no);
-}
-JsValue make_js_bigint(const void* bytes, bool is_unsigned) {
-  return JsValue(rr_js_make_bigint(bytes, is_unsigned));
-}
-JsValue make_js_items(DataType type, ByteSpan bytes) {
-  return JsValue(rr_js_make_items(static_cast<int>(type), bytes.data(), bytes.size()));
-}
-JsValue make_js_booleans(ByteSpan bytes) {
-  return JsValue(rr_js_make_booleans(bytes.data(), bytes.size()));
-}
-JsValue make_js_parts(DataType type, ByteSpan bytes, int part) {
-  const bool is_double = type == DataType::cdouble_t;
-  const auto part_type = is_double ? DataType::double_t : DataType::single_t;
-  return JsValue(rr_js_make_parts(static_cast<int>(part_type), bytes.data(), bytes.size() / item_size(type), part));
-}
-JsValue make_js_object() {
-  return JsValue(rr_js_make_object());
-}
-JsValue make_js_array() {
-  return JsValue(rr_js_make_array());
-}
-JsValue make_js_map() {
-  return JsValue(rr_js_make_map());
-}
-
-void set_js_field(const JsValue& object, std::string_view name, const JsValue& value) {
-  rr_js_set_field(object.handle(), name.data(), name.size(), value.handle());
-}
-void push_js(const JsValue& array, const JsValue& value) {
-  rr_js_push(array.handle(), value.handle());
-}
-void set_js_key(const JsValue& map, const JsValue& key, const JsValue& value) {
-  rr_js_set_key(map.handle(), key.handle(), value.handle());
-}
-void mark_js_type(const JsValue& object, std::string_view type) {
-  rr_js_mark_type(object.handle(), type.data(), type.size());
 }
 
 }  // namespace rr

@@ -93,23 +93,4 @@ class JsValue {
   JsHandle handle_;
 };
 
-/// Making values.
-JsValue make_js_text(std::string_view text);
-JsValue make_js_number(double value);
-JsValue make_js_boolean(bool value);
-JsValue make_js_bigint(const void* bytes, bool is_unsigned);
-/// A TypedArray with a copy of the bytes; `type` is one of 1..10.
-JsValue make_js_items(DataType type, ByteSpan bytes);
-JsValue make_js_booleans(ByteSpan bytes);
-/// Every second number of complex ones, as TypedArray; `part` 0: real, 1: imaginary.
-JsValue make_js_parts(DataType type, ByteSpan bytes, int part);
-JsValue make_js_object();
-JsValue make_js_array();
-JsValue make_js_map();
-
-void set_js_field(const JsValue& object, std::string_view name, const JsValue& value);
-void push_js(const JsValue& array, const JsValue& value);
-void set_js_key(const JsValue& map, const JsValue& key, const JsValue& value);
-void mark_js_type(const JsValue& object, std::string_view type);
-
 }  // namespace rr

@@ -32,23 +32,23 @@ std::string text_of(const JsValue& js) {
   return js.text().value_or(std::string());
 }
 
-JsValue make_js_event(std::string_view kind) {
-  const JsValue event = make_js_object();
-  set_js_field(event, "kind", make_js_text(kind));
-  return event;
+void begin_event(JsWriter& js, std::string_view kind) {
+  js.begin_object();
+  js.key("kind").name(kind);
 }
 
 bool is_varvalue(const TypeDefinition& type) {
   return type.type == DataType::varvalue_t;
 }
 
-JsValue make_js_arguments(const std::vector<Value>& values, const MemberDefinition* member, const TypeRegistry& types) {
-  JsValue arguments = make_js_array();
+void write_arguments(JsWriter& js, const std::vector<Value>& values, const MemberDefinition* member,
+                     const TypeRegistry& types) {
+  js.begin_array();
   for (std::size_t i = 0; i < values.size(); ++i) {
     const bool brings_type = member && i < member->parameters.size() && is_varvalue(member->parameters[i].type);
-    push_js(arguments, to_js(values[i], types, brings_type));
+    write_js(js, values[i], types, brings_type);
   }
-  return arguments;
+  js.end();
 }
 
 Error error_from_js(const JsValue& js) {

@@ -9,7 +9,7 @@
 #include "core/support/time.hpp"
 #include "core/types/type_registry.hpp"
 #include "core/types/value.hpp"
-#include "wasm-client/src/js_access.hpp"
+#include "wasm-client/src/js_writer.hpp"
 
 namespace rr {
 
@@ -21,11 +21,12 @@ double to_js_time(TimePoint at);
 std::chrono::milliseconds to_milliseconds(double number);
 /// Empty where it is no text.
 std::string text_of(const JsValue& js);
-/// {kind}
-JsValue make_js_event(std::string_view kind);
+/// {kind, and what is written next. build() ends it.
+void begin_event(JsWriter& js, std::string_view kind);
 bool is_varvalue(const TypeDefinition& type);
 /// What came with a call. `member` nullptr where it is not known any more.
-JsValue make_js_arguments(const std::vector<Value>& values, const MemberDefinition* member, const TypeRegistry& types);
+void write_arguments(JsWriter& js, const std::vector<Value>& values, const MemberDefinition* member,
+                     const TypeRegistry& types);
 /// {code, name, subName, message}
 Error error_from_js(const JsValue& js);
 

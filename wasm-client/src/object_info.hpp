@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/types/type_registry.hpp"
-#include "wasm-client/src/js_access.hpp"
+#include "wasm-client/src/js_writer.hpp"
 
 namespace rr {
 

@@ -6,7 +6,7 @@
 
 #include "core/hardware/usb_link.hpp"
 #include "core/hardware/usb_probe.hpp"
-#include "wasm-client/src/js_access.hpp"
+#include "wasm-client/src/js_writer.hpp"
 
 #define RR_EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -40,11 +40,12 @@ void* show(const UsbControl& request) {
 
 JsValue make_event(const UsbEvent& event) {
   static constexpr std::string_view kinds[] = {"opened", "readable", "writable", "closed"};
-  auto object = make_js_object();
-  set_js_field(object, "kind", make_js_text(kinds[static_cast<std::size_t>(event.kind)]));
-  set_js_field(object, "stream", make_js_number(event.stream));
-  set_js_field(object, "reason", make_js_text(event.reason.message));
-  return object;
+  JsWriter js;
+  js.begin_object();
+  js.key("kind").name(kinds[static_cast<std::size_t>(event.kind)]);
+  js.key("stream").number(event.stream);
+  js.key("reason").text(event.reason.message);
+  return js.build();
 }
 
 }  // namespace
@@ -79,10 +80,11 @@ RR_EXPORT(node) JsHandle rr_node() {
   const auto found = find_usb_pipes(interfaces, (*result)->function.interface);
   if (!found) return make_js_text(found.error().message).release();
   pipes = *found;
-  auto object = make_js_object();
-  set_js_field(object, "id", make_js_text(format_node_id((*result)->id, NodeIdFormat::dashes)));
-  set_js_field(object, "name", make_js_text((*result)->name));
-  return object.release();
+  JsWriter js;
+  js.begin_object();
+  js.key("id").text(format_node_id((*result)->id, NodeIdFormat::dashes));
+  js.key("name").text((*result)->name);
+  return js.build().release();
 }
 RR_EXPORT(interface_number) int rr_interface_number() {
   return (*probe.result())->function.interface;

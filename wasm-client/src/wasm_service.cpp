@@ -54,29 +54,27 @@ const JsValue& js_of(const std::shared_ptr<ServiceObject>& object) {
   return static_cast<const JsObject&>(*object).js();
 }
 
-JsValue make_member_event(std::string_view kind, const std::shared_ptr<ServiceObject>& object,
-                          const MemberDefinition& member) {
-  const JsValue event = make_js_event(kind);
-  set_js_field(event, "object", js_of(object));
-  set_js_field(event, "member", make_js_text(member.name));
-  return event;
+void begin_member_event(JsWriter& js, std::string_view kind, const std::shared_ptr<ServiceObject>& object,
+                        const MemberDefinition& member) {
+  begin_event(js, kind);
+  js.key("object").value(js_of(object));
+  js.key("member").name(member.name);
 }
 
-JsValue make_id_event(std::string_view kind, std::uint64_t id) {
-  const JsValue event = make_js_event(kind);
-  set_js_field(event, "id", make_js_number(static_cast<double>(id)));
-  return event;
+void begin_id_event(JsWriter& js, std::string_view kind, std::uint64_t id) {
+  begin_event(js, kind);
+  js.key("id").number(static_cast<double>(id));
 }
 
-void set_time(const JsValue& event, TimeSpec time) {
-  set_js_field(event, "seconds", make_js_number(static_cast<double>(time.seconds)));
-  set_js_field(event, "nanoseconds", make_js_number(time.nanoseconds));
+void write_time(JsWriter& js, TimeSpec time) {
+  js.key("seconds").number(static_cast<double>(time.seconds));
+  js.key("nanoseconds").number(time.nanoseconds);
 }
 
-JsValue make_numbers(const MemoryShape& shape) {
-  const JsValue numbers = make_js_array();
-  for (const auto number : shape) push_js(numbers, make_js_number(static_cast<double>(number)));
-  return numbers;
+void write_numbers(JsWriter& js, const MemoryShape& shape) {
+  js.begin_array();
+  for (const auto number : shape) js.number(static_cast<double>(number));
+  js.end();
 }
 
 /// What answers a call; void: anything does.
@@ -287,7 +285,9 @@ JsValue WasmService::call_callback(std::uint32_t number, const JsValue& path, co
   const auto called = client->session->call_callback(text_of(path), **member, *values, now_);
   if (!called) return to_js(called.error(), *types_);
   client->callbacks.emplace(*called, *member);
-  return make_js_number(static_cast<double>(*called));
+  JsWriter js;
+  js.number(static_cast<double>(*called));
+  return js.build();
 }
 
 void WasmService::release(const JsValue& path) {
@@ -337,24 +337,28 @@ JsValue WasmService::poll_event(std::uint32_t number) {
 JsValue WasmService::to_js_call(Client& client, const Called& called) const {
   const auto& member = *called.member;
   client.calls[called.id] = {called.kind, &member};
-  const JsValue js = make_member_event("call", called.object, member);
-  set_js_field(js, "call", make_js_text(call_names[static_cast<std::size_t>(called.kind)]));
-  set_js_field(js, "id", make_js_number(static_cast<double>(called.id)));
-  const JsValue arguments = make_js_arguments(called.arguments, &member, *types_);
+  JsWriter js;
+  begin_member_event(js, "call", called.object, member);
+  js.key("call").name(call_names[static_cast<std::size_t>(called.kind)]);
+  js.key("id").number(static_cast<double>(called.id));
   if (called.kind == CallKind::function || called.kind == CallKind::generator_open) {
-    set_js_field(js, "arguments", arguments);
+    js.key("arguments");
+    write_arguments(js, called.arguments, &member, *types_);
   } else if (called.arguments.size() == 1) {
     // One value: of the member's own type, or what a step of a generator takes.
     const auto& type = called.kind == CallKind::generator_next && !member.parameters.empty()
                            ? member.parameters.back().type
                            : member.type;
-    set_js_field(js, "value", to_js(called.arguments.front(), *types_, is_varvalue(type)));
+    js.key("value");
+    write_js(js, called.arguments.front(), *types_, is_varvalue(type));
   }
-  set_time(js, called.time);
-  set_js_field(js, "generator", make_js_number(static_cast<double>(called.generator)));
-  set_js_field(js, "position", make_numbers(called.range.position));
-  set_js_field(js, "count", make_numbers(called.range.count));
-  return js;
+  write_time(js, called.time);
+  js.key("generator").number(static_cast<double>(called.generator));
+  js.key("position");
+  write_numbers(js, called.range.position);
+  js.key("count");
+  write_numbers(js, called.range.count);
+  return js.build();
 }
 
 JsValue WasmService::event_to_js(Client& client, ServiceEvent& event) {
@@ -368,45 +372,45 @@ JsValue WasmService::event_to_js(Client& client, ServiceEvent& event) {
     for (const auto& [number, each] : clients_) each.session->handle_locks_changed(now_);
     return JsValue::undefined();
   }
-  if (const auto* wire = std::get_if<WireConnected>(&event))
-    return make_member_event("wire_connected", wire->object, *wire->member);
-  if (const auto* wire = std::get_if<WireReceived>(&event)) {
-    const JsValue js = make_member_event("wire", wire->object, *wire->member);
-    set_js_field(js, "value", to_js(wire->value, *types_, is_varvalue(wire->member->type)));
-    set_time(js, wire->time);
-    return js;
-  }
-  if (const auto* pipe = std::get_if<PipeConnected>(&event)) {
+  JsWriter js;
+  if (const auto* wire = std::get_if<WireConnected>(&event)) {
+    begin_member_event(js, "wire_connected", wire->object, *wire->member);
+  } else if (const auto* received = std::get_if<WireReceived>(&event)) {
+    begin_member_event(js, "wire", received->object, *received->member);
+    js.key("value");
+    write_js(js, received->value, *types_, is_varvalue(received->member->type));
+    write_time(js, received->time);
+  } else if (const auto* pipe = std::get_if<PipeConnected>(&event)) {
     client.pipes[pipe->id] = pipe->member;
-    const JsValue js = make_member_event("pipe_connected", pipe->object, *pipe->member);
-    set_js_field(js, "id", make_js_number(static_cast<double>(pipe->id)));
-    set_js_field(js, "index", make_js_number(pipe->index));
-    return js;
-  }
-  if (const auto* pipe = std::get_if<PipeReceived>(&event)) {
-    const auto known = client.pipes.find(pipe->id);
+    begin_member_event(js, "pipe_connected", pipe->object, *pipe->member);
+    js.key("id").number(static_cast<double>(pipe->id));
+    js.key("index").number(pipe->index);
+  } else if (const auto* packet = std::get_if<PipeReceived>(&event)) {
+    const auto known = client.pipes.find(packet->id);
     const bool brings_type = known != client.pipes.end() && is_varvalue(known->second->type);
-    const JsValue js = make_id_event("pipe", pipe->id);
-    set_js_field(js, "value", to_js(pipe->value, *types_, brings_type));
-    return js;
-  }
-  if (const auto* pipe = std::get_if<PipeClosed>(&event)) {
-    client.pipes.erase(pipe->id);
-    return make_id_event("pipe_closed", pipe->id);
-  }
-  if (const auto* ended = std::get_if<GeneratorEnded>(&event)) return make_id_event("generator_ended", ended->id);
-  if (const auto* completed = std::get_if<CallbackCompleted>(&event)) {
+    begin_id_event(js, "pipe", packet->id);
+    js.key("value");
+    write_js(js, packet->value, *types_, brings_type);
+  } else if (const auto* closed = std::get_if<PipeClosed>(&event)) {
+    client.pipes.erase(closed->id);
+    begin_id_event(js, "pipe_closed", closed->id);
+  } else if (const auto* ended = std::get_if<GeneratorEnded>(&event)) {
+    begin_id_event(js, "generator_ended", ended->id);
+  } else if (const auto* completed = std::get_if<CallbackCompleted>(&event)) {
     const auto known = client.callbacks.extract(completed->id);
     const bool brings_type = known && is_varvalue(known.mapped()->type);
-    const JsValue js = make_id_event("callback", completed->id);
+    begin_id_event(js, "callback", completed->id);
+    js.key(completed->result ? "value" : "error");
     if (completed->result)
-      set_js_field(js, "value", to_js(*completed->result, *types_, brings_type));
+      write_js(js, *completed->result, *types_, brings_type);
     else
-      set_js_field(js, "error", to_js(completed->result.error(), *types_));
-    return js;
+      write_js(js, completed->result.error(), *types_);
+  } else if (std::holds_alternative<ClientGone>(event)) {
+    begin_event(js, "gone");
+  } else {
+    return JsValue::undefined();
   }
-  if (std::holds_alternative<ClientGone>(event)) return make_js_event("gone");
-  return JsValue::undefined();
+  return js.build();
 }
 
 // --- looked at ---

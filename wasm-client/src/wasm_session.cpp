@@ -12,19 +12,19 @@ namespace rr {
 
 namespace {
 
-JsValue make_member_event(std::string_view kind, std::string_view path, std::string_view member) {
-  const JsValue event = make_js_event(kind);
-  set_js_field(event, "path", make_js_text(path));
-  set_js_field(event, "member", make_js_text(member));
-  return event;
+/// `event` one that comes from a member.
+template <class Event>
+void begin_member_event(JsWriter& js, std::string_view kind, const Event& event) {
+  begin_event(js, kind);
+  js.key("path").name(event.path);
+  js.key("member").name(event.member);
 }
 
 /// `event` one of those of pipe endpoints.
 template <class Event>
-JsValue make_pipe_event(std::string_view kind, const Event& event) {
-  const JsValue js = make_member_event(kind, event.path, event.member);
-  set_js_field(js, "index", make_js_number(event.index));
-  return js;
+void begin_pipe_event(JsWriter& js, std::string_view kind, const Event& event) {
+  begin_member_event(js, kind, event);
+  js.key("index").number(event.index);
 }
 
 }  // namespace
@@ -250,68 +250,83 @@ JsValue WasmSession::poll_event() {
 }
 
 JsValue WasmSession::event_to_js(const ClientEvent& event) {
-  const auto& types = session_.types();
-  if (const auto* connected = std::get_if<Connected>(&event)) {
-    const JsValue js = make_js_event("connected");
-    set_js_field(js, "type", make_js_text(connected->object_type));
-    return js;
-  }
-  if (const auto* completed = std::get_if<Completed>(&event)) {
-    const bool brings_type = varvalue_replies_.erase(completed->id) > 0;
-    const bool is_ok = completed->result.has_value();
-    const JsValue js = make_js_event(is_ok ? "completed" : "failed");
-    set_js_field(js, "id", make_js_number(completed->id));
-    if (is_ok)
-      set_js_field(js, "value", to_js(*completed->result, types, brings_type));
-    else
-      set_js_field(js, "error", to_js(completed->result.error(), types));
-    return js;
-  }
-  if (const auto* received = std::get_if<EventReceived>(&event)) {
-    const JsValue js = make_member_event("event", received->path, received->member);
-    const auto* member = find_member(received->path, received->member);
-    set_js_field(js, "arguments", make_js_arguments(received->arguments, member, types));
-    return js;
-  }
-  if (const auto* called = std::get_if<CallbackCalled>(&event)) {
-    const JsValue js = make_member_event("callback", called->path, called->member);
-    const auto* member = find_member(called->path, called->member);
-    set_js_field(js, "id", make_js_number(static_cast<double>(called->id)));
-    set_js_field(js, "arguments", make_js_arguments(called->arguments, member, types));
-    return js;
-  }
-  if (const auto* received = std::get_if<WireValueReceived>(&event)) {
-    const JsValue js = make_member_event("wire", received->path, received->member);
-    const auto* member = find_member(received->path, received->member);
-    set_js_field(js, "seconds", make_js_number(static_cast<double>(received->time.seconds)));
-    set_js_field(js, "nanoseconds", make_js_number(received->time.nanoseconds));
-    set_js_field(js, "value", to_js(received->value, types, member && is_varvalue(member->type)));
-    return js;
-  }
-  if (const auto* closed = std::get_if<WireClosedByService>(&event))
-    return make_member_event("wire_closed", closed->path, closed->member);
-  if (const auto* received = std::get_if<PipePacketReceived>(&event)) {
-    const JsValue js = make_pipe_event("pipe", *received);
-    const auto* member = find_member(received->path, received->member);
-    set_js_field(js, "value", to_js(received->value, types, member && is_varvalue(member->type)));
-    return js;
-  }
-  if (const auto* acknowledged = std::get_if<PipePacketsAcknowledged>(&event)) {
-    const JsValue js = make_pipe_event("pipe_acks", *acknowledged);
-    const JsValue numbers = make_js_array();
-    for (const auto number : acknowledged->numbers) push_js(numbers, make_js_number(number));
-    set_js_field(js, "numbers", numbers);
-    return js;
-  }
-  if (const auto* closed = std::get_if<PipeClosedByService>(&event)) return make_pipe_event("pipe_closed", *closed);
-  if (const auto* released = std::get_if<PathReleased>(&event)) {
-    const JsValue js = make_js_event("path_released");
-    set_js_field(js, "path", make_js_text(released->path));
-    return js;
-  }
-  const JsValue js = make_js_event("closed");
-  set_js_field(js, "error", to_js(std::get_if<SessionClosed>(&event)->reason, types));
-  return js;
+  JsWriter js;
+  std::visit([&](const auto& each) { write_event(js, each); }, event);
+  return js.build();
+}
+
+void WasmSession::write_event(JsWriter& js, const Connected& connected) {
+  begin_event(js, "connected");
+  js.key("type").text(connected.object_type);
+}
+
+void WasmSession::write_event(JsWriter& js, const Completed& completed) {
+  const bool brings_type = varvalue_replies_.erase(completed.id) > 0;
+  const bool is_ok = completed.result.has_value();
+  begin_event(js, is_ok ? "completed" : "failed");
+  js.key("id").number(completed.id);
+  js.key(is_ok ? "value" : "error");
+  if (is_ok)
+    write_js(js, *completed.result, session_.types(), brings_type);
+  else
+    write_js(js, completed.result.error(), session_.types());
+}
+
+void WasmSession::write_event(JsWriter& js, const EventReceived& received) {
+  begin_member_event(js, "event", received);
+  js.key("arguments");
+  write_arguments(js, received.arguments, find_member(received.path, received.member), session_.types());
+}
+
+void WasmSession::write_event(JsWriter& js, const CallbackCalled& called) {
+  begin_member_event(js, "callback", called);
+  js.key("id").number(static_cast<double>(called.id));
+  js.key("arguments");
+  write_arguments(js, called.arguments, find_member(called.path, called.member), session_.types());
+}
+
+void WasmSession::write_event(JsWriter& js, const WireValueReceived& received) {
+  begin_member_event(js, "wire", received);
+  js.key("seconds").number(static_cast<double>(received.time.seconds));
+  js.key("nanoseconds").number(received.time.nanoseconds);
+  write_member_value(js, received);
+}
+
+void WasmSession::write_event(JsWriter& js, const WireClosedByService& closed) {
+  begin_member_event(js, "wire_closed", closed);
+}
+
+void WasmSession::write_event(JsWriter& js, const PipePacketReceived& received) {
+  begin_pipe_event(js, "pipe", received);
+  write_member_value(js, received);
+}
+
+void WasmSession::write_event(JsWriter& js, const PipePacketsAcknowledged& acknowledged) {
+  begin_pipe_event(js, "pipe_acks", acknowledged);
+  js.key("numbers").begin_array();
+  for (const auto number : acknowledged.numbers) js.number(number);
+}
+
+void WasmSession::write_event(JsWriter& js, const PipeClosedByService& closed) {
+  begin_pipe_event(js, "pipe_closed", closed);
+}
+
+void WasmSession::write_event(JsWriter& js, const PathReleased& released) {
+  begin_event(js, "path_released");
+  js.key("path").text(released.path);
+}
+
+void WasmSession::write_event(JsWriter& js, const SessionClosed& closed) {
+  begin_event(js, "closed");
+  js.key("error");
+  write_js(js, closed.reason, session_.types());
+}
+
+template <class Event>
+void WasmSession::write_member_value(JsWriter& js, const Event& event) const {
+  const auto* member = find_member(event.path, event.member);
+  js.key("value");
+  write_js(js, event.value, session_.types(), member && is_varvalue(member->type));
 }
 
 JsValue WasmSession::take_error() {
@@ -328,43 +343,50 @@ std::size_t WasmSession::queued_bytes() const {
 
 JsValue WasmSession::stats() const {
   const auto stats = session_.connection().stats();
-  const JsValue js = make_js_object();
-  set_js_field(js, "messagesReceived", make_js_number(static_cast<double>(stats.messages_received)));
-  set_js_field(js, "messagesSent", make_js_number(static_cast<double>(stats.messages_sent)));
-  set_js_field(js, "bytesReceived", make_js_number(static_cast<double>(stats.bytes_received)));
-  set_js_field(js, "bytesSent", make_js_number(static_cast<double>(stats.bytes_sent)));
-  return js;
+  JsWriter js;
+  js.begin_object();
+  js.key("messagesReceived").number(static_cast<double>(stats.messages_received));
+  js.key("messagesSent").number(static_cast<double>(stats.messages_sent));
+  js.key("bytesReceived").number(static_cast<double>(stats.bytes_received));
+  js.key("bytesSent").number(static_cast<double>(stats.bytes_sent));
+  return js.build();
 }
 
 JsValue WasmSession::peer() const {
   const auto peer = session_.connection().peer();
-  const JsValue js = make_js_object();
-  set_js_field(js, "id", make_js_text(format_node_id(peer.id, NodeIdFormat::dashes)));
-  set_js_field(js, "name", make_js_text(peer.name));
-  return js;
+  JsWriter js;
+  js.begin_object();
+  js.key("id").text(format_node_id(peer.id, NodeIdFormat::dashes));
+  js.key("name").text(peer.name);
+  return js.build();
 }
 
 JsValue WasmSession::attributes() const {
-  return to_js(Value(session_.attributes()), session_.types(), true);
+  const Value attributes(session_.attributes());
+  JsWriter js;
+  write_js(js, attributes, session_.types(), true);
+  return js.build();
 }
 
 JsValue WasmSession::definitions() const {
-  const JsValue texts = make_js_array();
-  for (const auto& definition : session_.types().definitions()) push_js(texts, make_js_text(definition->text));
-  return texts;
+  JsWriter js;
+  js.begin_array();
+  for (const auto& definition : session_.types().definitions()) js.text(definition->text);
+  return js.build();
 }
 
 JsValue WasmSession::known_definitions() const {
-  const JsValue known = make_js_array();
-  if (!session_.known_definitions()) return known;
+  JsWriter js;
+  js.begin_array();
+  if (!session_.known_definitions()) return js.build();
   for (const auto& each : *session_.known_definitions()) {
-    const JsValue item = make_js_array();
-    push_js(item, make_js_text(each.name));
-    push_js(item, make_js_text(each.tag));
-    for (const auto& text : each.texts) push_js(item, make_js_text(text));
-    push_js(known, item);
+    js.begin_array();
+    js.text(each.name);
+    js.text(each.tag);
+    for (const auto& text : each.texts) js.text(text);
+    js.end();
   }
-  return known;
+  return js.build();
 }
 
 JsValue WasmSession::definition(const JsValue& name) const {

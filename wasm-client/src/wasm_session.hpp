@@ -6,7 +6,7 @@
 #include <set>
 
 #include "core/session/client/client_session.hpp"
-#include "wasm-client/src/js_access.hpp"
+#include "wasm-client/src/js_writer.hpp"
 
 namespace rr {
 
@@ -123,6 +123,19 @@ class WasmSession {
   /// Returns `id`, whose reply holds a value of the type.
   RequestId remember(RequestId id, const TypeDefinition& type);
   JsValue event_to_js(const ClientEvent& event);
+  void write_event(JsWriter& js, const Connected& event);
+  void write_event(JsWriter& js, const Completed& event);
+  void write_event(JsWriter& js, const EventReceived& event);
+  void write_event(JsWriter& js, const CallbackCalled& event);
+  void write_event(JsWriter& js, const WireValueReceived& event);
+  void write_event(JsWriter& js, const WireClosedByService& event);
+  void write_event(JsWriter& js, const PipePacketReceived& event);
+  void write_event(JsWriter& js, const PipePacketsAcknowledged& event);
+  void write_event(JsWriter& js, const PipeClosedByService& event);
+  void write_event(JsWriter& js, const PathReleased& event);
+  void write_event(JsWriter& js, const SessionClosed& event);
+  template <class Event>
+  void write_member_value(JsWriter& js, const Event& event) const;
 
   Now now_;
   ClientSession session_;

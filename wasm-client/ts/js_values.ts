@@ -3,28 +3,15 @@
 // No exception may cross frames of WebAssembly (they would not be unwound): whatever can run code of the application,
 // a getter or a Proxy, is caught in here and reported as handle 0 or a negative number.
 
+import { decodeText, itemTypes, JsReader, typeMark } from "./js_reader.js";
+
 /** A place in the table. */
 export type Handle = number;
 const failed: Handle = 0;
 
 const exactMark = Symbol.for("rrgate.exactValue");
-const typeMark = Symbol.for("rrgate.type");
-const decoder = new TextDecoder("utf-8", { ignoreBOM: true });
 const encoder = new TextEncoder();
 
-/** By rr::DataType, from 1 on. */
-const itemTypes = [
-  Float64Array,
-  Float32Array,
-  Int8Array,
-  Uint8Array,
-  Int16Array,
-  Uint16Array,
-  Int32Array,
-  Uint32Array,
-  BigInt64Array,
-  BigUint64Array,
-];
 const itemNames = itemTypes.map((type) => type.name);
 /** The engine's own getter: knows arrays of other realms (frames, vm contexts), runs no foreign code, never throws. */
 const nameOfItems = Object.getOwnPropertyDescriptor(
@@ -83,6 +70,7 @@ export class JsValues {
   /** The first ones as rr::JsHandle says; 0 stands for what could not be read. */
   readonly #values: unknown[] = [undefined, undefined, null, true, false];
   readonly #free: Handle[] = [];
+  readonly #reader = new JsReader((handle) => this.#values[handle]);
   #core!: CoreExports;
   #bytes: Uint8Array<ArrayBuffer> = new Uint8Array(0);
 
@@ -120,18 +108,6 @@ export class JsValues {
     if (handle <= 4) return;
     this.#values[handle] = undefined;
     this.#free.push(handle);
-  }
-
-  #text(at: number, length: number): string {
-    const bytes = this.bytes;
-    if (length > 32) return decoder.decode(bytes.subarray(at, at + length));
-    // Names: cheaper than the decoder.
-    let text = "";
-    for (let i = at; i < at + length; ++i) {
-      if (bytes[i]! > 127) return decoder.decode(bytes.subarray(at, at + length));
-      text += String.fromCharCode(bytes[i]!);
-    }
-    return text;
   }
 
   /** A handle for what `read` gives, unless it throws. */
@@ -194,7 +170,7 @@ export class JsValues {
       },
       item: (handle: Handle, index: number) => this.#attempt(() => (this.#values[handle] as unknown[])[index]),
       field: (handle: Handle, name: number, length: number) =>
-        this.#attempt(() => fieldOf(this.#values[handle] as Dictionary, this.#text(name, length))),
+        this.#attempt(() => fieldOf(this.#values[handle] as Dictionary, decodeText(this.bytes, name, length))),
       keys: (handle: Handle) => this.#attempt(() => Object.keys(this.#values[handle] as object)),
       /** [key, value, key, value, ...] */
       map_items: (handle: Handle) =>
@@ -229,41 +205,8 @@ export class JsValues {
           return true;
         }),
 
-      make_text: (at: number, length: number) => this.give(this.#text(at, length)),
-      make_number: (value: number) => this.give(value),
-      make_bigint: (at: number, isUnsigned: number) => {
-        const view = new DataView(this.bytes.buffer);
-        return this.give(isUnsigned ? view.getBigUint64(at, true) : view.getBigInt64(at, true));
-      },
-      make_items: (type: number, at: number, size: number) =>
-        this.give(new itemTypes[type - 1]!(this.bytes.slice(at, at + size).buffer)),
-      make_booleans: (at: number, count: number) => this.give(Array.from(this.bytes.subarray(at, at + count), Boolean)),
-      /** Parts of complex numbers: every second one. */
-      make_parts: (type: number, at: number, count: number, part: number) => {
-        const View = type === 1 ? Float64Array : Float32Array;
-        const pairs = new View(this.bytes.buffer, at, 2 * count);
-        return this.give(new View(count).map((_, index) => pairs[2 * index + part]!));
-      },
-      make_object: () => this.give({}),
-      make_array: () => this.give([]),
-      make_map: () => this.give(new Map()),
-      set_field: (object: Handle, name: number, length: number, value: Handle) => {
-        const key = this.#text(name, length);
-        const target = this.#values[object] as Dictionary;
-        // Always an own property: assigning to "__proto__" would replace the prototype.
-        if (key === "__proto__") {
-          const rights = { enumerable: true, writable: true, configurable: true };
-          Object.defineProperty(target, key, { value: this.#values[value], ...rights });
-        } else {
-          target[key] = this.#values[value];
-        }
-      },
-      push: (array: Handle, value: Handle) => void (this.#values[array] as unknown[]).push(this.#values[value]),
-      set_key: (map: Handle, key: Handle, value: Handle) =>
-        void (this.#values[map] as Map<unknown, unknown>).set(this.#values[key], this.#values[value]),
-      mark_type: (object: Handle, name: number, length: number) => {
-        Object.defineProperty(this.#values[object], typeMark, { value: this.#text(name, length) });
-      },
+      /** The value that the core has written there. */
+      build: (at: number) => this.give(this.#reader.read(this.bytes, at)),
 
       random: (to: number, size: number) => void crypto.getRandomValues(this.bytes.subarray(to, to + size)),
     },

@@ -7,7 +7,7 @@
 #include "core/session/service/service_session.hpp"
 #include "core/support/random.hpp"
 #include "core/types/multidim.hpp"
-#include "wasm-client/src/js_access.hpp"
+#include "wasm-client/src/js_writer.hpp"
 
 namespace {
 

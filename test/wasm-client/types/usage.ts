@@ -1,6 +1,9 @@
 // What programs do with generated types. Compiled, never run: each line marked as an error must be one.
 import { connect, lease, listUsbDevices, requestUsbDevice, rrValue, subscribe } from "rrgate-client";
 import type { Complex, RemoteObject, RrValue, SubscriptionState } from "rrgate-client";
+import * as react from "rrgate-client/react";
+import * as svelte from "rrgate-client/svelte";
+import * as vue from "rrgate-client/vue";
 import type { SimulatedCreate } from "generated/create.js";
 import type * as declared from "generated/interop.js";
 import { Color } from "generated/interop_module.js";
@@ -166,4 +169,22 @@ export async function follow(): Promise<void> {
   const run: number | undefined = enums.Mode?.run;
   void run;
   void far;
+}
+
+/** What a property of a store is set to has the property's type. */
+export async function set(): Promise<void> {
+  const url = "ws://localhost/?service=interop";
+  for (const property of [
+    react.useProperty(react.useDevice<declared.Interop>(url), "p_double"),
+    vue.useProperty(vue.useDevice<declared.Interop>(url), "p_double"),
+    svelte.propertyStore(subscribe<declared.Interop>(url), "p_double"),
+  ]) {
+    await property.set(3);
+    // @ts-expect-error not a number
+    await property.set("fast");
+  }
+  await react.useProperty(react.useDevice<declared.Interop>(url), "p_any").set(rrValue("int16[]", [1, 2]));
+  // @ts-expect-error readonly
+  await vue.useProperty(vue.useDevice<SimulatedCreate>(url), "DistanceTraveled").set(3);
+  await svelte.propertyStore(subscribe(url), "any").set("what the service takes");
 }

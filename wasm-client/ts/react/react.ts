@@ -13,6 +13,7 @@ import type {
   PropertyLike,
   PropertyOptions,
   PropertyStore,
+  SettableOf,
   Urls,
   ValueOf,
   View,
@@ -51,7 +52,7 @@ export function useProperty<T, K extends MembersLike<T, PropertyLike>>(
   { subscription }: DeviceState<T>,
   member: K,
   { every }: PropertyOptions = {},
-): MemberState<ValueOf<T, K>> & Pick<PropertyStore<ValueOf<T, K>>, "set" | "refresh"> {
+): MemberState<ValueOf<T, K>> & Pick<PropertyStore<ValueOf<T, K>, SettableOf<T, K>>, "set" | "refresh"> {
   const store = useMemo(() => propertyStore(subscription, member, { every }), [subscription, member, every]);
   return { ...useStore(store), set: store.set, refresh: store.refresh };
 }

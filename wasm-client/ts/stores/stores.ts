@@ -65,6 +65,15 @@ export type ValueOf<T, K> = string extends keyof T
       : never
     : never;
 
+/** What the property `K` of `T` may be set to. */
+export type SettableOf<T, K> = string extends keyof T
+  ? unknown
+  : K extends keyof T
+    ? T[K] extends { set(value: infer S, ...args: never[]): Promise<void> }
+      ? S
+      : never
+    : never;
+
 export type ParametersOf<T, K> = string extends keyof T
   ? unknown[]
   : K extends keyof T
@@ -78,9 +87,10 @@ export interface PropertyOptions {
   every?: number | undefined;
 }
 
-export interface PropertyStore<V> extends View<MemberState<V>> {
+/** `S`: what may be written; nothing where the property is readonly. */
+export interface PropertyStore<V, S = V> extends View<MemberState<V>> {
   /** Writes, then reads. @throws RobotRaconteurError (rejects) as set() of the property; InvalidOperation: not connected. */
-  readonly set: (value: unknown) => Promise<void>;
+  readonly set: (value: S) => Promise<void>;
   /** Reads now. Never rejects: the store has the error. */
   readonly refresh: () => Promise<void>;
 }
@@ -194,7 +204,7 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
   device: Subscription<T> | undefined,
   member: K,
   { every }: PropertyOptions = {},
-): PropertyStore<ValueOf<T, K>> {
+): PropertyStore<ValueOf<T, K>, SettableOf<T, K>> {
   type V = ValueOf<T, K>;
   const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => {
     const stop = device?.onConnected(() => void refresh());
@@ -207,7 +217,7 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
     };
   });
   const refresh = () => ask<V>(store, async () => (await connected(device, member)).get()).catch(() => undefined);
-  const set = async (value: unknown) => {
+  const set = async (value: SettableOf<T, K>) => {
     await (await connected(device, member)).set(value);
     await refresh();
   };

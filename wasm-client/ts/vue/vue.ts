@@ -12,6 +12,7 @@ import type {
   ParametersOf,
   PropertyLike,
   PropertyOptions,
+  SettableOf,
   Urls,
   ValueOf,
   View,
@@ -64,7 +65,7 @@ export function useProperty<T, K extends MembersLike<T, PropertyLike>>(
   options: MaybeRefOrGetter<PropertyOptions> = {},
 ): {
   readonly state: Readonly<ShallowRef<MemberState<ValueOf<T, K>>>>;
-  set: (value: unknown) => Promise<void>;
+  set: (value: SettableOf<T, K>) => Promise<void>;
   refresh: () => Promise<void>;
 } {
   const { store, value } = useStores(device, (subscription) => propertyStore(subscription, member, toValue(options)));

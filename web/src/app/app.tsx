@@ -62,8 +62,8 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
           <Mark />
           <span>rrgate</span>
         </a>
-        <Places route={where} />
-        <Crumbs route={where} />
+        {!isForm && <Places route={where} />}
+        {(!isForm || onlyStop) && <Crumbs route={where} />}
         <Account session={session} ask={() => setAsked(true)} />
         <LanguageSelect />
         <ThemeButton />

@@ -45,7 +45,8 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
         }}
       >
         <label>
-          {t("Roles")} <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
+          {t("Roles")}{" "}
+          <input class="field" type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
         </label>
         <button class="button" type="submit" disabled={words.length === 0}>
           {t("Approve")}

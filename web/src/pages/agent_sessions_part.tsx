@@ -8,7 +8,7 @@ import { AgentSessionList, sessionsOf } from "../gateway/agent_sessions";
 import type { AgentCommand, AgentSession, AgentSessionsState } from "../gateway/agent_sessions";
 import type { AgentsDesk } from "../gateway/agents";
 import { Folded } from "../ui/folded";
-import { clockTime, sentence, span } from "../ui/words";
+import { clockTime, ended, span } from "../ui/words";
 
 export function AgentSessionsPart({ agents }: { agents: AgentsDesk }) {
   if (!useStore(agents.state)) return null;
@@ -45,11 +45,11 @@ function Sessions() {
 /** Changes rarely, so that it can be announced: the numbers are below. */
 function headline(state: AgentSessionsState): string {
   if (state.kind === "loading") return t("Asking the gateway for them.");
-  if (state.kind === "denied") return t("You may not see them: {0}", sentence(state.reason));
+  if (state.kind === "denied") return t("You may not see them: {0}", ended(state.reason));
   if (state.kind === "away") {
     const below = state.sessions && state.sessions.length > 0 ? ` ${t("Below is what it said last.")}` : "";
     const since = clockTime(state.since);
-    return `${t("The gateway has not told them since {0}: {1}", since, sentence(state.reason))}${below}`;
+    return `${t("The gateway has not told them since {0}: {1}", since, ended(state.reason))}${below}`;
   }
   if (state.sessions.length === 0) return t("The gateway knows of no agent now.");
   return t("The agents that were here last, and the last commands of each.");

@@ -52,7 +52,13 @@ function Pattern({ label, value, set }: { label: string; value: string; set: (va
   return (
     <label>
       {label}{" "}
-      <input type="text" autocapitalize="none" value={value} onInput={(event) => set(event.currentTarget.value)} />
+      <input
+        class="field"
+        type="text"
+        autocapitalize="none"
+        value={value}
+        onInput={(event) => set(event.currentTarget.value)}
+      />
     </label>
   );
 }

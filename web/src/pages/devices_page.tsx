@@ -14,7 +14,7 @@ import { AuditPart } from "./audit_part";
 import { DeviceCard } from "./device_card";
 import { DeviceParts } from "./device_parts";
 import { StateBadge } from "../ui/state_badge";
-import { clockTime, sentence, span } from "../ui/words";
+import { clockTime, ended, sentence, span } from "../ui/words";
 
 interface DevicesPageParts {
   list: DeviceList;
@@ -102,7 +102,7 @@ function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {
   const now = useNow(1000);
   return (
     <>
-      {location.host}: {sentence(state.reason)}
+      {location.host}: {ended(state.reason)}
       {state.devices && state.devices.length > 0 && ` ${t("Below is what it said last.")}`}
       <span class="link-since" aria-hidden="true">
         {t("Away for {0}; asking every 2 s.", span(now - state.since))}

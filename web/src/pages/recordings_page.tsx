@@ -32,7 +32,9 @@ export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: Devi
       {state?.enabled && (
         <>
           <BeginForm desk={desk} list={list} />
-          <p class="note">{t("{0} of {1} taken", bytesText(state.bytes), bytesText(state.maxBytes))}</p>
+          <p class="note recordings-taken">
+            {t("{0} of {1} taken", bytesText(state.bytes), bytesText(state.maxBytes))}
+          </p>
           {state.list.length === 0 && <p class="empty">{t("There are no recordings yet.")}</p>}
           <ul class="devices">
             {state.list.map((each) => (

@@ -48,7 +48,9 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   return (
     <div class={`page ${width}`}>
       <div class="service-head">
-        <h1 class="place-name">{device}</h1>
+        <h1 class="place-name" title={device}>
+          {device}
+        </h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {link && !onlyStop && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>

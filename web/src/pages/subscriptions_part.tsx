@@ -7,7 +7,7 @@ import { useStore } from "../app/store";
 import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
 import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
 import { Folded } from "../ui/folded";
-import { ageText, clockTime, sentence } from "../ui/words";
+import { ageText, clockTime, ended } from "../ui/words";
 
 interface Props {
   device: string;
@@ -51,11 +51,11 @@ function Subscriptions({ device, online, stale }: Props) {
 /** Changes rarely, so that it can be announced: the numbers are in the table. */
 function headline(state: SubscriptionsState, online: boolean, stale: boolean): string {
   if (state.kind === "loading") return t("Asking the gateway for them.");
-  if (state.kind === "denied") return t("You may not see them: {0}", sentence(state.reason));
+  if (state.kind === "denied") return t("You may not see them: {0}", ended(state.reason));
   if (state.kind === "away") {
     const below = state.subscriptions && state.subscriptions.length > 0 ? ` ${t("Below is what it said last.")}` : "";
     const since = clockTime(state.since);
-    return `${t("The gateway has not told them since {0}: {1}", since, sentence(state.reason))}${below}`;
+    return `${t("The gateway has not told them since {0}: {1}", since, ended(state.reason))}${below}`;
   }
   if (!online && !stale) return t("The device is away: nothing comes until it is back, and then they go on.");
   if (state.subscriptions.length === 0) return t("No client listens to a wire or a pipe of it now.");

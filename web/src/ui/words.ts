@@ -39,8 +39,16 @@ export function flowing(text: string): string {
   return text.trim().replace(/(\S)[ \t]*\n(?!\s|[-*•]|\d+[.)])/g, "$1 ");
 }
 
-/** The same text with an end. */
+/** The same text with an end, and a capital where it begins with a plain word; names and addresses stay as they are. */
 export function sentence(text: string): string {
+  return ended(text).replace(
+    /^[a-z]+(?:'[a-z]+)?(?=,? |[.!?]$)/,
+    (word) => word.charAt(0).toUpperCase() + word.slice(1),
+  );
+}
+
+/** The same text with an end: the rest of a sentence. */
+export function ended(text: string): string {
   const trimmed = text.trim();
   return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
 }
