@@ -23,7 +23,7 @@ export default function StreamsPanel({ place }: PanelProps) {
   const now = performance.now();
   return (
     <div class="panel-scroll" tabIndex={0} role="group" aria-label={t("Streams")}>
-      <table class="value-table">
+      <table class="value-table streams-table">
         <thead>
           <tr>
             <th scope="col">{t("Stream")}</th>

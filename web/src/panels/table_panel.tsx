@@ -2,7 +2,6 @@
 // Layer: web/panels.
 
 import { useMemo } from "preact/hooks";
-import { t } from "../app/language";
 import { useFeed } from "../live/use_feed";
 import { jsonOf } from "../values/draft";
 import { rowsOf } from "../values/rows";
@@ -50,7 +49,6 @@ export default function TablePanel({ object, members, settings, change, definiti
             </tbody>
           </table>
         )}
-        {look.value === undefined && look.failure === null && <p class="note">{t("no value yet")}</p>}
       </div>
       <Freshness look={look} isLive={object !== null} />
     </div>
