@@ -19,22 +19,23 @@ struct CheckOptions {
 };
 
 /// What is said of a file. Without errors, `rrgate serve` takes it.
-struct Verdict {
+struct CheckedConfig {
   std::vector<Finding> errors;
   std::vector<Finding> warnings;
   std::size_t devices = 0;
 };
 
 /// Errors   those of find_missing_rights().
-rr::Result<Verdict> judge(const CheckOptions& options) {
+rr::Result<CheckedConfig> judge(const CheckOptions& options) {
   const auto parsed = load_config(options.file);
   const auto& config = parsed.config;
-  if (!parsed.findings.empty()) return Verdict{parsed.findings};
+  if (!parsed.findings.empty()) return CheckedConfig{parsed.findings};
   if (const auto& certificates = config.tls.certificates; !certificates.empty())
     if (const auto tls = rr::make_web_tls(certificates, config.access.clients); !tls)
-      return Verdict{{{"/tls/certificates", tls.error().message}}};
-  if (const auto access = load_access(config.access); !access) return Verdict{{{"/access", access.error().message}}};
-  Verdict out;
+      return CheckedConfig{{{"/tls/certificates", tls.error().message}}};
+  if (const auto access = load_access(config.access); !access)
+    return CheckedConfig{{{"/access", access.error().message}}};
+  CheckedConfig out;
   out.devices = config.devices.size();
   if (options.service_user) {
     const auto missing = find_missing_rights(*options.service_user, options.file, config);
