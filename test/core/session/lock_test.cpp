@@ -140,7 +140,8 @@ class Clients {
   /// Memories have eight numbers.
   static Value answer_to(const Called& called) {
     if (called.kind == CallKind::memory_dimensions) return Value(MemoryShape{8});
-    if (called.kind == CallKind::memory_read) return Value(std::vector<double>(called.range.count.at(0)));
+    if (called.kind == CallKind::memory_read)
+      return Value(std::vector<double>(static_cast<std::size_t>(called.range.count.at(0))));
     return called.member->type.type == DataType::string_t ? Value("x") : Value(1);
   }
 

@@ -47,7 +47,8 @@ void wipe_what_is_free(Message& message) {
   header.sender_node_name = header.receiver_node_name = {};
   for (auto& element : message.elements) {
     if (element.name == "packettime")
-      for (auto i = &element - message.elements.data() + 1; i < element.end; ++i) wipe(message, message.elements[i]);
+      for (auto i = static_cast<std::size_t>(&element - message.elements.data()) + 1; i < element.end; ++i)
+        wipe(message, message.elements[i]);
     const bool is_void = element.type == DataType::void_t || element.type == DataType::int32_t;
     if (element.name == "return" && is_void && message.elements.size() == 1 &&
         (message.entries.front().type == EntryType::function_call_res ||

@@ -18,7 +18,7 @@ inline constexpr int last_of_generator = 6;
 
 /// Item `i` of the memory is `i`.
 inline std::vector<double> items(std::uint64_t from, std::uint64_t count) {
-  std::vector<double> numbers(count);
+  std::vector<double> numbers(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < count; ++i) numbers[i] = static_cast<double>(from + i);
   return numbers;
 }
