@@ -1,5 +1,6 @@
 // How often reading a value crosses between JavaScript and WebAssembly: a number that does not grow with its fields.
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
+import { JsReader } from "../../wasm-client/ts/js_reader.js";
 import { connect, TestService } from "./service.js";
 
 const definition = `service test.crossings
@@ -126,4 +127,14 @@ it("reads names beyond those that it remembers, and long ones", async () => {
   for (let i = 0; i < 2; ++i) expect(await robot["wide"]!.get()).toEqual(wide);
   await robot["state"]!.set(state);
   expect(await robot["state"]!.get()).toEqual(state);
+});
+
+it("takes no name for another where the value that told it was not read", () => {
+  const reader = new JsReader(() => null);
+  const name = (code: number, text = ""): Uint8Array<ArrayBuffer> =>
+    Uint8Array.of(8, code & 0xff, code >> 8, text.length, 0, 0, 0, ...new TextEncoder().encode(text));
+  expect(reader.read(name(0x8005, "speed"), 0)).toBe("speed");
+  expect(reader.read(name(5), 0)).toBe("speed");
+  expect(() => reader.read(name(4), 0)).toThrow("the name 4 is missing");
+  expect(reader.read(name(0xffff, "long"), 0)).toBe("long");
 });

@@ -77,9 +77,12 @@ class Written {
     size_ += size;
   }
 
-  const std::uint8_t* data() const { return bytes_.data(); }
-  void clear() {
+  /// What was written, until something is written again: nothing of it stays, also if who reads it throws.
+  const std::uint8_t* take() {
     size_ = 0;
+    return bytes_.data();
+  }
+  void give_back() {
     if (bytes_.size() > kept) bytes_ = Bytes();
   }
 
@@ -105,14 +108,15 @@ void put_text(std::string_view text) {
 }
 
 // In place of the number of a name, as in ts/js_reader.ts.
-constexpr std::uint16_t new_name = 0xffff;    ///< a text follows, which gets the next number
-constexpr std::uint16_t other_name = 0xfffe;  ///< a text follows
+constexpr std::uint16_t new_name = 0x8000;    ///< with a number: a text follows, which has this number from now on
+constexpr std::uint16_t other_name = 0xffff;  ///< a text follows
 
 template <class Code>
 void put_name(Code code, std::string_view name) {
   const auto [number, is_new] = known_names.find(name);
   written.put(code);
-  written.put(is_new ? new_name : number == KnownNames::none ? other_name : number);
+  written.put(number == KnownNames::none ? other_name
+                                         : static_cast<std::uint16_t>(is_new ? new_name | number : number));
   if (is_new || number == KnownNames::none) put_text(name);
 }
 
@@ -206,8 +210,8 @@ void JsWriter::mark(std::string_view type) {
 
 JsValue JsWriter::build() {
   while (open_ > 0) end();
-  JsValue built(rr_js_build(written.data()));
-  written.clear();
+  JsValue built(rr_js_build(written.take()));
+  written.give_back();
   return built;
 }
 

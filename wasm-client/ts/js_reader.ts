@@ -23,9 +23,9 @@ export const typeMark = Symbol.for("rrgate.type");
 const codeEnd = 0;
 const codeName = 8;
 const codeMark = 16;
-/** In place of the number of a name. */
-const newName = 0xffff;
-const otherName = 0xfffe;
+/** A text follows; with newName it has the number beside it from now on. */
+const newName = 0x8000;
+const otherName = 0xffff;
 
 export function decodeText(bytes: Uint8Array<ArrayBuffer>, at: number, length: number): string {
   if (length > 32) return decoder.decode(bytes.subarray(at, at + length));
@@ -165,9 +165,13 @@ export class JsReader {
   }
 
   #name(): string {
-    const number = this.#view.getUint16(this.#skip(2), true);
-    if (number === otherName) return this.#text();
-    if (number === newName) this.#names.push(this.#text());
-    return this.#names[number === newName ? this.#names.length - 1 : number]!;
+    const code = this.#view.getUint16(this.#skip(2), true);
+    if (code === otherName) return this.#text();
+    const number = code & ~newName;
+    if (code & newName) this.#names[number] = this.#text();
+    const name = this.#names[number];
+    if (name === undefined)
+      throw new Error(`rrgate-client: an earlier value was not read, and the name ${number} is missing`);
+    return name;
   }
 }
