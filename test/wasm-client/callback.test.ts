@@ -72,7 +72,11 @@ it("sends errors back", async () => {
 it("tells both sides of an answer that does not fit", async () => {
   const reported = vi.spyOn(console, "error").mockImplementation(() => undefined);
   robot["price"]!.handler = () => "much";
-  const error = await failure(ask());
+  const heard = vi.fn();
+  const asked = failure(ask()).then((error) => (heard(), error));
+  await settle(); // at once, not with the next heartbeat
+  expect(heard).toHaveBeenCalledOnce();
+  const error = await asked;
   expect(error.code).toBe(ErrorCode.DataTypeMismatch);
   expect((reported.mock.calls[0]![0] as RobotRaconteurError).message).toBe(error.message);
   reported.mockRestore();

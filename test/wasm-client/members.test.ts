@@ -14,6 +14,7 @@ object Part
   property string name
   property double size
   objref Part inner
+  event touched()
 end
 object Base
   function double add(double left, double right)
@@ -229,6 +230,19 @@ describe("events", () => {
     expect((await lost).message).toBe("cable");
   });
 
+  it("end with the object that the service replaces", async () => {
+    const head = await m("head").get<RemoteObject>();
+    const touched = head["touched"]!;
+    const loop = (async () => {
+      for await (const _ of touched);
+    })();
+    const ends = [failure(loop), failure(touched.once())];
+    await settle();
+    await m("release")("test.head");
+    for (const { message } of await Promise.all(ends))
+      expect(message).toBe('the service released object "test.head": look it up again');
+  });
+
   it("fill a loop in order, none missing", async () => {
     const sides: RrValue[] = [];
     const loop = (async () => {
@@ -346,6 +360,23 @@ describe("wires", () => {
     const loop = wire[Symbol.asyncIterator]();
     expect((await failure(loop.next())).message).toBe("enough");
     await m("both").connect().ready; // the next one is not affected
+  });
+
+  it("leave a newer connection alone when they are closed before they are ready", async () => {
+    void m("both").connect().close();
+    const wire = m("both").connect();
+    await wire.ready;
+    await settle();
+    await m("publish_both")(8);
+    expect(wire.value).toBe(8);
+    await wire.close();
+    void m("both").connect().close();
+    await m("both").connect().close();
+    await settle();
+    const last = m("both").connect();
+    await last.ready;
+    await m("publish_both")(9);
+    expect(last.value).toBe(9);
   });
 });
 

@@ -369,6 +369,25 @@ it("keeps a pipe over connections, without losing what came", async () => {
   await subscription.close();
 });
 
+it("connects a member once that is wanted because of the new state", async () => {
+  const subscription = follow(inTurn(await start()));
+  const seen: unknown[] = [];
+  subscription.state.subscribe(({ status }) => {
+    if (status !== "connected") return;
+    const pipe = subscription.pipe("echo");
+    void (async () => {
+      for await (const packet of pipe) seen.push(packet);
+    })();
+  });
+  const client = await subscription.client();
+  await settle();
+  await client["stream_echo"]!(1, 2);
+  await vi.waitUntil(() => seen.length >= 2);
+  await settle();
+  expect(seen).toEqual([1, 1]);
+  await subscription.close();
+});
+
 it("ends a loop over a pipe that is too far behind", async () => {
   const subscription = follow(inTurn(await start()));
   const pipe = subscription.pipe("echo", { limit: 10 });

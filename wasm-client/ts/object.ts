@@ -11,7 +11,7 @@ import { makeObjref } from "./members/objref.js";
 import { makePipe } from "./members/pipe.js";
 import { makeProperty } from "./members/property.js";
 import { makeWire } from "./members/wire.js";
-import { checkTimeout } from "./session.js";
+import { checkTimeout, isWithin, releasedObject } from "./session.js";
 import type { Session } from "./session.js";
 import { checkSignal, within } from "./within.js";
 import type {
@@ -85,7 +85,7 @@ export class ObjectTree {
 
   #release(path: string): void {
     for (const [known, { released }] of [...this.#objects]) {
-      if (known !== path && !known.startsWith(`${path}.`)) continue;
+      if (!isWithin(known, path)) continue;
       this.#objects.delete(known);
       for (const tell of released.splice(0)) tell();
     }
@@ -282,7 +282,7 @@ export class Info implements ObjectInfo {
     this.#isReleased = true;
     const closers = [...this.#closers];
     this.#closers.clear();
-    const reason = makeError("ObjectNotFound", `the service released object "${this.path}": look it up again`);
+    const reason = releasedObject(this.path);
     for (const closed of closers) callSafely(() => closed(reason));
   }
 }

@@ -148,9 +148,11 @@ export class Session {
   /** Something without an answer. @throws RobotRaconteurError */
   tell<T>(what: (core: Core) => T): T {
     if (this.#end) throw this.#end.reason;
-    const result = what(this.core);
-    this.#pump();
-    return result;
+    try {
+      return what(this.core);
+    } finally {
+      this.#pump(); // also where it failed: the service may be told so
+    }
   }
 
   /** Nothing where there is room for more to send; else what resolves when there is. */
@@ -192,6 +194,21 @@ export class Session {
   onRelease(released: (path: string) => void): () => void {
     this.#releaseListeners.add(released);
     return () => void this.#releaseListeners.delete(released);
+  }
+
+  /** Calls once, when the session has ended or the service has replaced the object. */
+  onEnd(path: string, ended: (reason?: RobotRaconteurError) => void): () => void {
+    const stopClosing = this.onClose((reason) => end(reason));
+    const stopReleasing = this.onRelease((above) => isWithin(path, above) && end(releasedObject(path)));
+    const stop = () => {
+      stopClosing();
+      stopReleasing();
+    };
+    const end = (reason?: RobotRaconteurError) => {
+      stop();
+      ended(reason);
+    };
+    return stop;
   }
 
   /** Calls once, when the session has ended; soon, if it has already. */
@@ -325,7 +342,7 @@ export class Session {
       case "path_released":
         for (const key of this.#handlers.keys()) {
           const [path] = key.split(" ", 1) as [string];
-          if (path === event.path || path.startsWith(`${event.path}.`)) this.#handlers.delete(key);
+          if (isWithin(path, event.path)) this.#handlers.delete(key);
         }
         for (const released of [...this.#releaseListeners]) callSafely(() => released(event.path));
         break;
@@ -382,4 +399,13 @@ export class Session {
 export function checkTimeout(milliseconds: number, name = "timeout"): number {
   if (milliseconds > 0) return milliseconds;
   throw makeError("InvalidArgument", `${name} ${String(milliseconds)}: expected milliseconds above 0`);
+}
+
+/** Whether `path` is that of an object or of one below it. */
+export function isWithin(path: string, object: string): boolean {
+  return path === object || path.startsWith(`${object}.`);
+}
+
+export function releasedObject(path: string): RobotRaconteurError {
+  return makeError("ObjectNotFound", `the service released object "${path}": look it up again`);
 }

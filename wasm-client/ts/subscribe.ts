@@ -315,6 +315,7 @@ export class Subscription<T = RemoteObject> {
     this.#client = client;
     this.#reason = undefined;
     this.#backoff.reset();
+    const listeners = [...this.#connected]; // one who comes because of the new state hears of the client by itself
     this.#become({ status: "connected" });
     client.$.onClose((reason) => {
       if (this.#client !== client) return;
@@ -324,7 +325,7 @@ export class Subscription<T = RemoteObject> {
       for (const lost of [...this.#lost]) callSafely(() => lost(why));
       this.#retry();
     });
-    for (const connected of [...this.#connected]) callSafely(() => connected(client));
+    for (const connected of listeners) if (this.#connected.has(connected)) callSafely(() => connected(client));
   }
 
   #retry(): void {

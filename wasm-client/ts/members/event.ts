@@ -29,7 +29,7 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
         const fail = (reason: unknown) => (end(), reject(reason));
         const abort = () => fail(signal?.reason);
         const stopListening = listen((args) => (end(), resolve(args)));
-        const stopClosing = session.onClose((reason) => fail(reason ?? closedHere()));
+        const stopClosing = session.onEnd(path, (reason) => fail(reason ?? closedHere()));
         const timer =
           timeout === undefined
             ? undefined
@@ -50,7 +50,7 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
         return makeError("OutOfSystemResource", `${queueLimit} events ${info.name} wait and nobody takes them`);
       });
       const stopListening = listen((args) => queue.push(args));
-      const stopClosing = session.onClose((reason) => (reason ? queue.fail(reason) : queue.end()));
+      const stopClosing = session.onEnd(path, (reason) => (reason ? queue.fail(reason) : queue.end()));
       return queue;
     },
   } satisfies EventMember);

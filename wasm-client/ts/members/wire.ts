@@ -14,7 +14,7 @@ export function makeWire(context: MemberContext): WireMember<unknown> {
   return Object.freeze({
     connect: (options = {}) => {
       checkSignal(options.signal);
-      if (!shared || shared.isOver) shared = new SharedWire(context);
+      if (!shared || shared.isOver) shared = new SharedWire(context, (wire) => wire !== shared);
       return shared.join(options);
     },
     peek: async (options = {}) => session.request((core) => core.peekInValue(path, name), options),
@@ -39,7 +39,11 @@ class SharedWire {
   readonly #stopClosing: () => void;
   #isConnected = false;
 
-  constructor(readonly context: MemberContext) {
+  /** @param isReplaced  whether a newer connection of the same wire has been asked for meanwhile */
+  constructor(
+    readonly context: MemberContext,
+    isReplaced: (wire: SharedWire) => boolean,
+  ) {
     const { session, path, info } = context;
     this.#stopListening = session.listen(path, info.name, {
       onWireValue: (value, seconds, nanoseconds) => {
@@ -55,7 +59,8 @@ class SharedWire {
       .then(
         () => {
           this.#isConnected = true;
-          if (this.isOver) void this.#disconnect();
+          // Nobody wants it any more; with a newer one the service and the core have but one connection.
+          if (this.isOver && !isReplaced(this)) void this.#disconnect();
         },
         (error: unknown) => {
           this.#end(error);
