@@ -73,6 +73,15 @@ describe("a run", () => {
     expect(two.run.failure.value).toBe("out of reach");
   });
 
+  it("is not said to be stopped where the connection is gone", async () => {
+    const { run, next, generator } = await running();
+    run.leave();
+    expect([run.state.value, run.failure.value]).toEqual(["not stopped", "the connection is gone: it may still run"]);
+    expect((generator as { return: unknown }).return).toHaveBeenCalledOnce();
+    expect(next).toHaveBeenCalledTimes(2);
+    expect(run.isFresh).toBe(true);
+  });
+
   it("steps once where it does not run by itself", async () => {
     const { generator, next, answer } = makeGenerator();
     const run = new GeneratorRun(() => undefined);

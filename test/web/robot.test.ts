@@ -1,3 +1,4 @@
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import { Driver } from "../../web/src/robot/driver";
 import { Holds } from "../../web/src/robot/holds";
 import { advance, ORIGIN, Reckoner, wrapAngle } from "../../web/src/robot/reckoning";
@@ -206,6 +207,36 @@ describe("driver", () => {
     await calls[1]?.answer();
     vi.advanceTimersByTime(5000);
     expect(calls).toHaveLength(2);
+  });
+  const refused = () =>
+    new RobotRaconteurError({ code: ErrorCode.PermissionDenied, name: "RobotRaconteur.PermissionDenied", message: "no" });
+  it("does not repeat a stop that is refused where it has moved nothing", async () => {
+    const { calls, send } = connection();
+    const told = vi.fn();
+    const driver = makeDriver(told);
+    driver.setConnection({ send });
+    driver.stop();
+    await calls[0]?.fail(refused());
+    vi.advanceTimersByTime(5000);
+    expect([calls.length, driver.isMoving, told.mock.calls.length]).toEqual([1, false, 1]);
+    driver.want(GO);
+    await calls[1]?.fail(refused());
+    vi.advanceTimersByTime(5000);
+    expect([calls.length, driver.isMoving]).toEqual([2, false]);
+  });
+  it("repeats a stop that is refused where it may have moved the robot", async () => {
+    const { calls, send } = connection();
+    const driver = makeDriver();
+    driver.setConnection({ send });
+    driver.want(GO);
+    driver.stop();
+    await calls[1]?.fail(refused());
+    await calls[0]?.fail(new Error("timeout"));
+    vi.advanceTimersByTime(450);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, STOP]);
+    await calls[2]?.answer();
+    vi.advanceTimersByTime(5000);
+    expect([calls.length, driver.isMoving]).toEqual([3, false]);
   });
   it("says that a stop could not be sent without a connection", () => {
     const { calls, send } = connection();

@@ -237,6 +237,7 @@ const german: Readonly<Record<string, string>> = {
   ended: "zu Ende",
   stopped: "gestoppt",
   "not stopped": "nicht gestoppt",
+  "the connection is gone: it may still run": "die Verbindung ist weg: es läuft vielleicht weiter",
   "stopping: the device answers the step under way first":
     "wird gestoppt: das Gerät beantwortet erst den laufenden Schritt",
   Calls: "Aufrufe",

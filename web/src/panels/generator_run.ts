@@ -2,6 +2,7 @@
 // Layer: web/panels, pure. A stop goes out at once; the client rejects the step under way with OperationAborted.
 
 import { ErrorCode, RobotRaconteurError } from "rrgate-client";
+import { t } from "../app/language";
 import { Store } from "../app/store";
 import { explain } from "../robot/remote";
 
@@ -68,7 +69,8 @@ export class GeneratorRun {
     const mine = this.#values;
     this.#goesOn = false;
     if (!mine) return;
-    this.#end("stopped");
+    this.#end("not stopped");
+    this.failure.value = t("the connection is gone: it may still run");
     mine.return().catch(() => undefined); // nobody is there to be told
   }
 

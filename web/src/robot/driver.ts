@@ -2,6 +2,8 @@
 // Layer: web/robot. A stop goes out at once, past whatever is unanswered. A moving command waits for the answers to all
 // others, and a newer one replaces it meanwhile: a robot that answers late is never sent old wishes.
 
+import { ErrorCode, RobotRaconteurError } from "rrgate-client";
+
 /** Settles when the robot has answered, or after DRIVE_TIMEOUT_MS. `insists`: somebody asked for a stop, whoever moves the robot. */
 export type Send<Command> = (command: Command, insists: boolean) => Promise<void>;
 
@@ -30,6 +32,8 @@ export class Driver<Command> {
   #sent: Command;
   /** From a moving command on, until a stop is answered while no moving command is under way. */
   #mayMove = false;
+  /** Meanwhile a moving command was carried out, or may have been. */
+  #hasMoved = false;
   #insists = false;
   #unanswered = { moves: 0, stops: 0 };
   #repeat: ReturnType<typeof setInterval> | undefined;
@@ -44,6 +48,7 @@ export class Driver<Command> {
   setConnection(means: Means<Command> | null): void {
     this.#means = means;
     this.#wanted = this.#options.rest;
+    if (this.#unanswered.moves > 0) this.#hasMoved = true;
     this.#unanswered = { moves: 0, stops: 0 };
     this.#rest();
     if (this.#mayMove) this.#transmit(this.#options.rest);
@@ -59,7 +64,8 @@ export class Driver<Command> {
   }
 
   /**
-   * Somebody asked for a stop: sent whoever moves the robot, and again until it is answered.
+   * Somebody asked for a stop: sent whoever moves the robot, and again until it is answered. A refusal is an answer,
+   * unless this page has moved the robot.
    * @returns false where there is no connection: nothing was sent.
    */
   stop(): boolean {
@@ -130,13 +136,21 @@ export class Driver<Command> {
     if (error !== null) {
       this.#wanted = this.#options.rest;
       this.#options.onError(error);
-    } else if (isStop && this.#unanswered.moves === 0) {
-      this.#mayMove = false;
     }
+    const isRefused = isRefusal(error);
+    if (!isStop && !isRefused) this.#hasMoved = true;
+    if (isStop && error === null && this.#unanswered.moves === 0) this.#hasMoved = this.#mayMove = false;
+    if (isStop && isRefused) this.#insists = false;
+    if (isRefused && !this.#hasMoved && this.#unanswered.moves === 0) this.#mayMove = false;
     if (!this.#isAnswered) return;
     if (this.#isStop(this.#wanted) && !this.#mayMove) this.#rest();
     else if (!this.#options.same(this.#sent, this.#wanted))
       if (this.#isStop(this.#wanted)) this.#transmit(this.#wanted);
       else this.#move();
   }
+}
+
+function isRefusal(error: unknown): boolean {
+  if (!(error instanceof RobotRaconteurError)) return false;
+  return error.code === ErrorCode.PermissionDenied || error.code === ErrorCode.ObjectLockedError;
 }
