@@ -288,7 +288,7 @@ void SharedClient::handle(const rr::CallbackCompleted& completed) {
 
 void SharedClient::answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result) {
   const auto service = result ? owner_->find_service(login.attempt.service) : nullptr;
-  if (service && service->upstream()->is_resting()) {
+  if (service && (service->upstream()->is_resting() || !service->upstream()->has_tried())) {
     const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
     asio::co_spawn(executor(), answer_when_open(self, service->upstream(), login.id, std::move(*result)),
                    asio::detached);
@@ -348,10 +348,7 @@ rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient>
     co_return;
   }
   if (!opened) {
-    const auto refused = opened.error().code == rr::ErrorCode::authentication_error
-                             ? opened.error()
-                             : rr::make_error(rr::ErrorCode::authentication_error, opened.error().message);
-    client.session_.answer_login(login.id, refused, rr::read_clocks());
+    client.session_.answer_login(login.id, opened.error(), rr::read_clocks());
     client.settle();
     co_return;
   }

@@ -131,8 +131,16 @@ void SharedService::withdraw() {
   for (auto* client : clients) client->close_service();
 }
 
+/// While it has clients, also such as use sessions of their own, the gateway hears what becomes of the service.
+void SharedService::add(SharedClient& client) {
+  clients_.insert(&client);
+  upstream_->hold(true);
+}
+
 void SharedService::remove(SharedClient& client) {
-  if (clients_.erase(&client) > 0) add_to(device_->traffic(), client.session());
+  if (clients_.erase(&client) == 0) return;
+  add_to(device_->traffic(), client.session());
+  if (clients_.empty()) upstream_->hold(false);
 }
 
 void SharedService::add_traffic(Traffic& traffic) const {

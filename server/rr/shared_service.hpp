@@ -61,7 +61,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// Looks for an object and adds it to what is hosted.
   void find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done);
 
-  void add(SharedClient& client) { clients_.insert(&client); }
+  void add(SharedClient& client);
   void remove(SharedClient& client);
   const std::set<SharedClient*>& clients() const { return clients_; }
   /// Adds what the clients that are there have had.

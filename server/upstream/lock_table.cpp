@@ -71,8 +71,10 @@ void LockTable::remove(LockClient client, rr::TimePoint now) {
   const auto left = parties_.extract(client);
   if (!left) return;
   const auto& party = left.mapped();
+  // Whom the device lets use a lock of this one's session: clients of that, or those who lock there as the same user.
   const auto of_user = std::find_if(parties_.begin(), parties_.end(), [&](const auto& other) {
-    return !party.user.is_nobody() && other.second.user == party.user;
+    if (party.user.is_nobody() || other.second.user != party.user) return false;
+    return party.has_own_session ? other.second.has_own_session : other.second.session == party.session;
   });
   for (auto it = locks_.begin(); it != locks_.end();) {
     const auto at = it++;

@@ -17,6 +17,11 @@ rr::Error misfit(const SafeAction& action, const std::string& why) {
                         "safe value " + rr::quote(action.path + "." + action.member) + " of the gateway: " + why);
 }
 
+/// Of a session that may do less than the one which found the object.
+bool is_refusal(const rr::Error& error) {
+  return error.code == rr::ErrorCode::authentication_error || error.code == rr::ErrorCode::permission_denied;
+}
+
 rr::MemberKind member_kind(SafeAction::Kind kind) {
   return kind == SafeAction::Kind::call   ? rr::MemberKind::function
          : kind == SafeAction::Kind::wire ? rr::MemberKind::wire
@@ -79,7 +84,7 @@ void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
       auto& wanted = self->items_[i];
       if (found)
         self->read(wanted, *upstream);
-      else if (upstream->is_open())
+      else if (upstream->is_open() && !(wanted.request && is_refusal(found.error())))
         self->take(wanted, misfit(wanted.action, found.error().message));
       self->pay(upstream);
     });
@@ -125,6 +130,7 @@ void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
 bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by) {
   if (!by || !by->is_open()) {
     if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
+    if (on_owed_) on_owed_();
     return false;
   }
   by->forget_commands(path);

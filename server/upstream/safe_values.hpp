@@ -38,6 +38,8 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   bool has(std::string_view path) const;
   /// Whether some could not be sent yet.
   bool is_owing() const { return !owed_.empty(); }
+  /// Some could not be sent now.
+  void on_owed(std::function<void()> handler) { on_owed_ = std::move(handler); }
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by);
@@ -55,6 +57,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   std::string device_;
   std::vector<Item> items_;
   std::vector<std::string> owed_;  ///< paths of leases that have ended while there was no session
+  std::function<void()> on_owed_;
 };
 
 }  // namespace rrgate

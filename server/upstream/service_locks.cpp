@@ -193,9 +193,9 @@ void ServiceLocks::end_leases() {
 
 /// The holder's session, where it is open still; else any other with the service.
 std::shared_ptr<Upstream> ServiceLocks::open_upstream(const std::shared_ptr<Upstream>& first) {
-  if (first && first->is_open()) return first;
+  if (first && first->may_act()) return first;
   for (const auto& [number, known] : upstreams_)
-    if (auto upstream = known.lock(); upstream && upstream->is_open()) return upstream;
+    if (auto upstream = known.lock(); upstream && upstream->may_act()) return upstream;
   return nullptr;
 }
 
@@ -217,9 +217,18 @@ void ServiceLocks::end_leases(const std::string& why) {
 }
 
 void ServiceLocks::handle_opened(const std::shared_ptr<Upstream>& upstream) {
-  if (!device_.config().leases.is_offered) return;
+  if (!device_.config().leases.is_offered || !upstream->may_act()) return;
   upstreams_[upstream->number()] = upstream;
+  safe_->on_owed([weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->wake_upstreams();
+  });
   safe_->handle_opened(upstream);
+}
+
+/// What is owed is not to wait until somebody wants something of the device.
+void ServiceLocks::wake_upstreams() {
+  for (const auto& [number, known] : upstreams_)
+    if (const auto upstream = known.lock()) upstream->wake();
 }
 
 void ServiceLocks::handle_lost(const Upstream& upstream) {

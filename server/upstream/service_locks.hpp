@@ -84,6 +84,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   rr::Result<> handle_lease(const UpstreamClient& client, LockClient id, const rr::LockWanted& wanted);
   /// The device is made safe where leases have ended.
   void end_leases();
+  void wake_upstreams();
   std::shared_ptr<Upstream> open_upstream(const std::shared_ptr<Upstream>& first);
 
   /// Does what the table wants done.

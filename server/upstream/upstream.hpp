@@ -114,6 +114,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// comes it is opened to see what there is, and rests at once.
   void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
   bool is_resting() const { return is_resting_; }
+  /// Whether it stays open though none of its own clients uses it.
+  void hold(bool is_held);
   /// Has it opened again where it rests.
   void wake();
   /// The device answers again: one that waits for its next attempt makes it now.
@@ -143,6 +145,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::Result<> take_over_definitions(const rr::TypeRegistry& from);
   /// Whether the service is for users who have logged in, and this session is nobody's.
   bool requires_user() const { return requires_user_; }
+  /// Whether it is open, and the device lets it do anything.
+  bool may_act() const { return is_open() && !requires_user_; }
   /// Null while it is not open.
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
@@ -354,6 +358,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
   bool is_attempting_ = false;
   bool is_resting_ = false;
+  bool is_held_ = false;
   bool is_wanted_ = false;   ///< a client has come, or was about to
   bool is_waking_ = false;   ///< has rested, and the attempt to open it again is not over
   bool is_watched_ = false;  ///< watch_use() waits

@@ -196,13 +196,13 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
 
 rr::awaitable<bool> Upstream::watch_use() {
   while (is_open() && !is_closed_) {
-    const bool may_rest = clients_.empty() && rests_after_ > rests_after_.zero();
+    const bool may_rest = !is_held_ && clients_.empty() && rests_after_ > rests_after_.zero();
     // Where leases are offered, what makes the device safe is still being checked.
     if (may_rest && !is_wanted_ && !device_->config().leases.is_offered) co_return true;
     wake_.expires_at(may_rest ? std::chrono::steady_clock::now() + rests_after_
                               : asio::steady_timer::time_point::max());
     const auto [cancelled] = co_await wake_.async_wait(wait_token);
-    if (may_rest && !cancelled && clients_.empty() && is_open()) co_return true;
+    if (may_rest && !cancelled && clients_.empty() && is_open() && !locks_->is_owing()) co_return true;
   }
   co_return false;
 }
@@ -221,6 +221,12 @@ void Upstream::wake() {
   is_resting_ = false;
   is_waking_ = true;
   wake_.cancel();
+}
+
+void Upstream::hold(bool is_held) {
+  is_held_ = is_held;
+  if (is_held) wake();
+  if (is_watched_) wake_.cancel();
 }
 
 void Upstream::retry_now() {

@@ -76,4 +76,9 @@ class LoginLimit {
   TimePoint forgotten_until_ = {};
 };
 
+/// Whether nobody could judge a login, since whoever would is away: its client is told so, and it is no failed one.
+inline bool is_unjudged(const Error& error) {
+  return error.code == ErrorCode::connection_error;
+}
+
 }  // namespace rr

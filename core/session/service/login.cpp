@@ -69,7 +69,7 @@ void ServiceSession::answer_login(LoginId id, Result<AuthenticatedUser> result, 
   login_.reset();
   if (result && result->name.empty())
     result = make_error(ErrorCode::internal_error, "the authenticator returned a user without name");
-  if (!result) {
+  if (!result && !is_unjudged(result.error())) {
     if (!login.service->is_remote()) login.service->login_limit().handle_failure(now);
     ++failed_logins_;
   }
@@ -90,7 +90,8 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
     connection_.authorise();
     outgoing_.add_text("return", "OK");
   } else {
-    write_error(outgoing_, {ErrorCode::authentication_error, result.error().message});
+    const auto& error = result.error();
+    write_error(outgoing_, is_unjudged(error) ? error : Error{ErrorCode::authentication_error, error.message});
   }
   send_outgoing(now);
 }

@@ -320,7 +320,9 @@ void ServiceSession::finish_combined(const OpenLogin& login, Result<Authenticate
     outgoing_.begin_entry(reply_type(login.type), login.path, login.member, login.request_id);
   };
   begin();
-  const Result<> done = result ? accept_combined(login, std::move(*result), now) : login_failed();
+  const Result<> done = result                        ? accept_combined(login, std::move(*result), now)
+                        : is_unjudged(result.error()) ? Result<>(result.error())
+                                                      : login_failed();
   if (!done) {
     begin();
     write_error(outgoing_, done.error());

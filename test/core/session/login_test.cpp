@@ -101,6 +101,30 @@ TEST_CASE("a wrong password, an unknown user and no login at all end the same wa
   }
 }
 
+TEST_CASE("a login that nobody can judge fails as a connection does, and is no guess") {
+  const auto away = make_error(ErrorCode::connection_error, "the device is away");
+  Guarded pair(true);
+  pair.start(login("alice", password("secret")));
+  pair.service->answer_login(pair.next_service<LoginRequested>().id, away, pair.now);
+  pair.pump();
+  const auto closed = pair.next_client<SessionClosed>();
+  CHECK(closed.reason.code == ErrorCode::connection_error);
+  CHECK(closed.reason.message == "connect to 'arm': the device is away");
+
+  Guarded later(false);
+  later.start(login("", {}));
+  later.next_client<Connected>();
+  later.next_service<ClientConnected>();
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    const auto id = later.client->authenticate("alice", password("secret"), later.now);
+    later.pump();
+    later.service->answer_login(later.next_service<LoginRequested>().id, away, later.now);
+    later.pump();
+    CHECK(later.completion(id).error().code == ErrorCode::connection_error);
+  }
+  CHECK_FALSE(later.service->wants_close());
+}
+
 TEST_CASE("a wrong password in the older sequence") {
   Guarded pair(true);
   pair.start(login("alice", password("wrong"), no_combined()));

@@ -195,6 +195,20 @@ TEST_CASE("a user of the gateway and one of the device share a name, not their l
   CHECK_FALSE(t.may(there));
 }
 
+TEST_CASE("a user's lock is left to no client whom the device would refuse it") {
+  Transcript t;
+  const LockClient socket = 1;
+  t.table.add(socket, {Subject{Subject::Kind::device_user, "bob"}, alices, false});
+  t.has_own(2, "bob", alices_other);
+  t.wants(socket, LockCommand::lock_for_user);
+  t.device_says(t.asked(LockCommand::lock_for_client, alices));
+  t.answered(socket);
+  t.table.remove(socket, t.now);
+  t.device_says(t.asked(LockCommand::unlock, alices));
+  t.left(socket);
+  CHECK(t.table.held().empty());
+}
+
 TEST_CASE("a client's lock is for no other client of its user") {
   Transcript t;
   const auto alice = t.shares(1, "alice"), again = t.shares(2, "alice");

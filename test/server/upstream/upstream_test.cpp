@@ -64,6 +64,38 @@ struct Counting {
   long open_generators() const { return life.use_count() - 1; }
 };
 
+/// Everybody is who he says, and nobody is nobody.
+class Believing final : public rr::Authenticator {
+ public:
+  rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt& attempt) const override {
+    return rr::AuthenticatedUser{attempt.username};
+  }
+};
+
+LeaseConfig leases_with_stop() {
+  LeaseConfig leases;
+  leases.is_offered = true;
+  leases.safe = {{SafeAction::Kind::call, "bench", "stop", "[]"}};
+  return leases;
+}
+
+/// Has a lease of the whole service, by `upstream`.
+void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder) {
+  std::optional<bool> is_held;
+  rr::LockWanted wanted;
+  wanted.command = rr::LockCommand::acquire_lease;
+  wanted.path = "bench";
+  wanted.timeout = 10s;
+  upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
+  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
+  REQUIRE(*is_held);
+}
+
+void cut(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream) {
+  upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+  REQUIRE(bench.run_until([&] { return !upstream->is_open(); }));
+}
+
 /// When a session is opened that is lost at once.
 struct Attempts {
   std::vector<std::chrono::steady_clock::time_point> times;
@@ -623,22 +655,11 @@ TEST_CASE("a client that is gone is not asked with all others, and the device ha
 
 TEST_CASE("a device that was away when a lease ended is made safe when it is back, though nobody uses it any more") {
   Counting device;
-  LeaseConfig leases;
-  leases.is_offered = true;
-  leases.safe = {{SafeAction::Kind::call, "bench", "stop", "[]"}};
-  UpstreamBench bench(device.service, leases);
+  UpstreamBench bench(device.service, leases_with_stop());
   bench.open();
   std::optional<HearingClient> holder(std::in_place, bench.upstream);
-  std::optional<bool> is_held;
-  rr::LockWanted wanted;
-  wanted.command = rr::LockCommand::acquire_lease;
-  wanted.path = "bench";
-  wanted.timeout = 10s;
-  bench.upstream->lock(*holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
-  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
-  REQUIRE(*is_held);
-  bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
-  REQUIRE(bench.run_until([&] { return !bench.upstream->is_open(); }));
+  take_lease(bench, bench.upstream, *holder);
+  cut(bench, bench.upstream);
   holder.reset();
   bench.upstream->close();
   const std::weak_ptr<Upstream> before = std::exchange(bench.upstream, nullptr);
@@ -647,4 +668,59 @@ TEST_CASE("a device that was away when a lease ended is made safe when it is bac
   bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{});
   bench.open();
   CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+}
+
+TEST_CASE("a session that rests is opened to make the device safe") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with_stop());
+  bench.upstream->rest_unused(50ms);
+  bench.upstream->keep_open({10ms, 20ms, 10s});
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
+  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  HearingClient holder(own);
+  take_lease(bench, own, holder);
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting(); }));
+  cut(bench, own);
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+  CHECK(bench.run_until([&] { return bench.upstream->is_resting(); }));  // and no longer than that
+  own->close();
+}
+
+TEST_CASE("a session of nobody's makes nothing safe where the device wants users") {
+  Counting device;
+  rr::SecurityPolicy policy;
+  policy.authenticator = std::make_shared<Believing>();
+  policy.require_valid_user = true;
+  device.service->set_security(policy);
+  UpstreamBench bench(device.service, leases_with_stop());
+  bench.open();
+  REQUIRE(bench.upstream->requires_user());
+  const auto own =
+      std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{"alice", {}}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  HearingClient holder(own);
+  take_lease(bench, own, holder);
+  cut(bench, own);
+  REQUIRE(bench.upstream->is_open());
+  CHECK(device.commands.empty());
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+  own->close();
+}
+
+TEST_CASE("a session that is held does not rest until it is let go") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->hold(true);
+  bench.upstream->rest_unused(20ms);
+  bench.upstream->keep_open({10ms, 20ms, 10s});
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
+  bool has_passed = false;
+  boost::asio::steady_timer while_it_is_held(bench.io, 100ms);
+  while_it_is_held.async_wait([&](const auto&) { has_passed = true; });
+  REQUIRE(bench.run_until([&] { return has_passed; }));
+  CHECK_FALSE(bench.upstream->is_resting());
+  bench.upstream->hold(false);
+  CHECK(bench.run_until([&] { return bench.upstream->is_resting(); }));
 }
