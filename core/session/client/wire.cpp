@@ -67,13 +67,23 @@ Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& 
   return send_outgoing(now);
 }
 
+void ClientSession::send_waiting_value(const PathMember& key, WireConnection& wire, Now now) {
+  if (!wire.waiting || state_ == ClientState::closed) return;
+  const Value value = std::move(wire.waiting->value);
+  // What can fail is a value that does not fit, which others don't wait for, or the connection, which is heard
+  // elsewhere.
+  (void)send_wire_packet(key, wire, value, now);
+}
+
+/// In turns: a wire that fills the stream again and again does not hold up those that sort behind it.
 void ClientSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || state_ == ClientState::closed) continue;
-    const Value value = std::move(wire.waiting->value);
-    // What can fail is a value that does not fit, which others don't wait for, or the connection, which is heard
-    // elsewhere.
-    (void)send_wire_packet(key, wire, value, now);
+  auto next = wires_.upper_bound(last_flushed_);
+  for (auto left = wires_.size(); left > 0; --left) {
+    if (next == wires_.end()) next = wires_.begin();
+    auto& [key, wire] = *next++;
+    if (!wire.waiting) continue;
+    last_flushed_ = key;
+    send_waiting_value(key, wire, now);
     if (connection_.queued_bytes() >= wire_high_mark) return;
   }
 }

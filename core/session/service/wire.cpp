@@ -41,13 +41,20 @@ Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& pack
   return sent;
 }
 
+/// In turns: a wire that fills the stream again and again does not hold up those that sort behind it.
 void ServiceSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
+  if (!may_use_service()) return;
+  auto next = wires_.upper_bound(last_flushed_);
+  for (auto left = wires_.size(); left > 0; --left) {
+    if (next == wires_.end()) next = wires_.begin();
+    auto& [key, wire] = *next++;
+    if (!wire.waiting || wire.state == WireState::connecting) continue;
+    last_flushed_ = key;
     const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
     WirePacket packet(key.path, *wire.member, value, time, wire.waiting_since);
-    // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(wire, packet, now) || connection_.queued_bytes() >= wire_high_mark) return;
+    // What can fail is a value that does not fit, which others don't wait for, or the session, with all its wires.
+    (void)send_wire_packet(wire, packet, now);
+    if (!service_ || connection_.queued_bytes() >= wire_high_mark) return;
   }
 }
 
