@@ -303,6 +303,21 @@ TEST_CASE("a user lock ends with the last session of the user") {
   CHECK(all.get(bob));
 }
 
+TEST_CASE("a user who logs in again keeps what is locked") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  CHECK(all.lock(alice, LockKind::user, "arm.tool"));
+  CHECK(all.lock(alice, LockKind::client, "arm.slots[1]"));
+  CHECK(all.ask(alice, alice.client->authenticate("alice", Value(MapString{}), all.now())));
+  for (const auto* path : {"arm.tool", "arm.slots[1]"}) {
+    CHECK(all.get(alice, "name", path));
+    CHECK(why(all.get(bob, "name", path)) == "151 Object locked by alice");
+  }
+  all.drop(alice);
+  CHECK(all.service().object_locks().empty());
+}
+
 TEST_CASE("who may not lock, and where nobody may") {
   Clients all;
   auto& nobody = all.add("");
