@@ -26,7 +26,10 @@ RequestId ClientSession::connect_wire(std::string_view path, std::string_view me
 }
 
 RequestId ClientSession::disconnect_wire(std::string_view path, std::string_view member, Now now) {
-  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) wires_.erase(found);
+  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) {
+    send_waiting_value(found->first, found->second, now);
+    wires_.erase(found);
+  }
   return request_wire(EntryType::wire_disconnect_req, path, member, now);
 }
 
@@ -39,7 +42,9 @@ RequestId ClientSession::peek_out_value(std::string_view path, std::string_view 
 }
 
 RequestId ClientSession::poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now) {
-  return request_wire(EntryType::wire_poke_out_value_req, path, member, now, &value);
+  const auto id = request_wire(EntryType::wire_poke_out_value_req, path, member, now, &value);
+  if (pending_.contains(id)) drop_waiting_value(path, member);  // it is older, and would be sent behind this one
+  return id;
 }
 
 Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {

@@ -276,3 +276,44 @@ TEST_CASE("a service's value that does not fit holds up no other wire while the 
   pair.pump();
   CHECK(count_torques<WireValueReceived>(*pair.client) == 1);
 }
+
+TEST_CASE("the last value of a wire is sent before what ends the wire") {
+  Loopback pair;
+  connect_wires(pair);
+  pair.client->set_property("arm", "pose", large_pose(0), pair.now);
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));  // waits
+  SECTION("which is its disconnect") {
+    pair.client->disconnect_wire("arm", "torque", pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(2.0));
+    pair.next_service<WireDisconnected>();
+  }
+  SECTION("which is the end of the session") {
+    pair.client->disconnect(pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(2.0));
+    pair.next_service<ClientGone>();
+  }
+}
+
+TEST_CASE("a value that waits for the stream is not sent behind a newer one that is poked") {
+  Loopback pair;
+  connect_wires(pair);
+  pair.client->set_property("arm", "pose", large_pose(0), pair.now);
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(1.0), pair.now));  // waits
+  SECTION("but replaced by it") {
+    pair.client->poke_out_value("arm", "torque", Value(2.0), pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<Called>().arguments == std::vector<Value>{Value(2.0)});
+  }
+  SECTION("one that does not fit replaces nothing") {
+    pair.client->poke_out_value("arm", "torque", Value("text"), pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(1.0));
+  }
+  CHECK_FALSE(pair.service->poll_event());
+}
