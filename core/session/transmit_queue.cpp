@@ -46,16 +46,19 @@ std::span<const ByteSpan> TransmitQueue::slices() {
   slices_.clear();
   in_flight_ = 0;
   std::size_t skip = front_consumed_;
+  std::size_t bytes = 0;
+  const auto is_full = [&] { return slices_.size() >= max_slices || bytes >= write_size; };
   for (const auto& message : waiting()) {
-    if (slices_.size() >= max_slices) break;
+    if (is_full()) break;
     ++in_flight_;
     for (const auto& slice : message->slices()) {
       if (skip >= slice.size()) {
         skip -= slice.size();
         continue;
       }
-      if (slices_.size() >= max_slices) break;
+      if (is_full()) break;
       slices_.push_back(slice.subspan(skip));
+      bytes += slices_.back().size();
       skip = 0;
     }
   }
@@ -69,8 +72,8 @@ void TransmitQueue::consume(std::size_t bytes) {
     front_consumed_ -= messages_[first_]->size();
     pop_front();
   }
-  // A message that is written in part stays in flight: nothing may be put before its rest.
-  in_flight_ = std::max<std::size_t>(in_flight_, front_consumed_ > 0 ? 1 : 0);
+  // Nothing may be put before the rest of a message that is written in part; nobody has begun to write the others.
+  in_flight_ = front_consumed_ > 0 ? 1 : 0;
 }
 
 void TransmitQueue::pop_front() {
@@ -79,7 +82,6 @@ void TransmitQueue::pop_front() {
   front->clear();
   if (spare_.size() < max_spare_messages) spare_.push_back(std::move(front));
   front.reset();
-  if (in_flight_ > 0) --in_flight_;
   if (urgent_end_ > 0) --urgent_end_;
   // Written ones are taken out when they are half of all: nothing is moved twice as often as it is sent.
   if (++first_ * 2 < messages_.size()) return;

@@ -12,10 +12,13 @@
 namespace rr {
 
 /// Encoded messages that wait to be written. A driver takes slices(), writes any number of their bytes and reports them
-/// with consume(). Messages whose slices were handed out stay where they are until they are consumed; urgent messages
-/// go ahead of all others.
+/// with consume() before it takes slices() again. Messages whose slices were handed out stay where they are until then;
+/// urgent messages go ahead of all others.
 class TransmitQueue {
  public:
+  /// As many bytes are written at once: what is urgent waits for no more than that.
+  static constexpr std::size_t write_size = 256 * 1024;
+
   /// Encodes `message` behind everything (or, if urgent, ahead of what is not being written yet).
   Result<> push(const Message& message, const EncodeOptions& options, bool is_urgent = false);
   Result<> push(SharedMessage& message, const EncodeOptions& options, bool is_urgent = false);
@@ -25,10 +28,11 @@ class TransmitQueue {
   /// Those, and what the messages themselves take: the larger part of many small ones.
   std::size_t held() const { return held_; }
 
-  /// What to write next, in order, 32 slices at most. They stay valid until consume().
+  /// What to write next, in order: 32 slices at most, and none behind write_size bytes. They stay valid until
+  /// consume().
   std::span<const ByteSpan> slices();
 
-  /// `bytes` of the slices handed out were written.
+  /// `bytes` of the slices handed out were written, and no more of them is being written.
   void consume(std::size_t bytes);
 
  private:
@@ -48,7 +52,7 @@ class TransmitQueue {
   std::size_t size_ = 0;
   std::size_t held_ = 0;
   std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already
-  std::size_t in_flight_ = 0;       ///< messages, from the first one, whose slices were handed out
+  std::size_t in_flight_ = 0;       ///< messages, from the first one, of which bytes are written or may be
   std::size_t urgent_end_ = 0;      ///< messages, from the first one, up to the last urgent one: they keep their order
 };
 

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/session/transmit_queue.hpp"
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
 #include "node/driver/clocks.hpp"
@@ -75,7 +76,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   void finish(Error reason, Now now);
 
   static constexpr std::size_t read_size = 64 * 1024;
-  static constexpr std::size_t write_size = 256 * 1024;  ///< at most at once: the session hears how it goes on
+  /// At most at once: the session hears how it goes on.
+  static constexpr std::size_t write_size = TransmitQueue::write_size;
 
   std::unique_ptr<ByteStream> stream_;
   boost::asio::steady_timer timer_;

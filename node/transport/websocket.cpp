@@ -64,8 +64,11 @@ awaitable<error_code> WebSocketStream::write(std::span<const ByteSpan> slices) {
   if (is_broken_) co_return asio::error::broken_pipe;
   const auto frames = splitter_.split(slices);
   if (frames.empty()) co_return error_code();  // an empty frame would end a native peer's connection
+  std::size_t size = 0;
+  for (const auto& frame : frames) size += frame.size();
   const auto error = co_await write_raw(frames);
-  if (!error) splitter_.consume(SIZE_MAX);
+  // Of a frame that try_write() has begun this may be a part only.
+  if (!error) splitter_.consume(size);
   co_return error;
 }
 

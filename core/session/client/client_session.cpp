@@ -256,6 +256,7 @@ void ClientSession::cancel(RequestId id) {
 void ClientSession::disconnect(Now now) {
   if (state_ == ClientState::closed || state_ == ClientState::closing) return;
   if (state_ == ClientState::connecting) return fail(connection_error("closed by this side"));
+  for (auto& [key, wire] : wires_) send_waiting_value(key, wire, now);
   const auto id = begin_request(EntryType::disconnect_client, {}, {});
   outgoing_.add_text("servicename", options_.service);
   if (auto sent = send_outgoing(now); !sent) return fail(sent.error());

@@ -351,6 +351,7 @@ class ClientSession {
   RequestId request_wire(EntryType type, std::string_view path, std::string_view member, Now now,
                          const Value* value = nullptr);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
+  void send_waiting_value(const PathMember& key, WireConnection& wire, Now now);
 
   template <class AddElements>
   RequestId request_session_op(std::string_view path, std::string_view command, Now now, AddElements&& add_elements);
@@ -431,6 +432,7 @@ class ClientSession {
 
   std::map<std::string, const EntityDefinition*, std::less<>> objects_;
   Wires wires_;
+  PathMember last_flushed_;                                            ///< of wires_: the next flush goes on behind it
   std::map<PathMember, std::uint32_t, PathMemberLess> memory_limits_;  ///< MaxTransferSize of memories that were used
   PipeStore pipe_store_;                                               ///< outlives pipes_
   std::map<PathMember, ClientPipe, PathMemberLess> pipes_;

@@ -26,7 +26,10 @@ RequestId ClientSession::connect_wire(std::string_view path, std::string_view me
 }
 
 RequestId ClientSession::disconnect_wire(std::string_view path, std::string_view member, Now now) {
-  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) wires_.erase(found);
+  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) {
+    send_waiting_value(found->first, found->second, now);
+    wires_.erase(found);
+  }
   return request_wire(EntryType::wire_disconnect_req, path, member, now);
 }
 
@@ -39,7 +42,9 @@ RequestId ClientSession::peek_out_value(std::string_view path, std::string_view 
 }
 
 RequestId ClientSession::poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now) {
-  return request_wire(EntryType::wire_poke_out_value_req, path, member, now, &value);
+  const auto id = request_wire(EntryType::wire_poke_out_value_req, path, member, now, &value);
+  if (pending_.contains(id)) drop_waiting_value(path, member);  // it is older, and would be sent behind this one
+  return id;
 }
 
 Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {
@@ -67,13 +72,23 @@ Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& 
   return send_outgoing(now);
 }
 
+void ClientSession::send_waiting_value(const PathMember& key, WireConnection& wire, Now now) {
+  if (!wire.waiting || state_ == ClientState::closed) return;
+  const Value value = std::move(wire.waiting->value);
+  // What can fail is a value that does not fit, which others don't wait for, or the connection, which is heard
+  // elsewhere.
+  (void)send_wire_packet(key, wire, value, now);
+}
+
+/// In turns: a wire that fills the stream again and again does not hold up those that sort behind it.
 void ClientSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || state_ == ClientState::closed) continue;
-    const Value value = std::move(wire.waiting->value);
-    // What can fail is a value that does not fit, which others don't wait for, or the connection, which is heard
-    // elsewhere.
-    (void)send_wire_packet(key, wire, value, now);
+  auto next = wires_.upper_bound(last_flushed_);
+  for (auto left = wires_.size(); left > 0; --left) {
+    if (next == wires_.end()) next = wires_.begin();
+    auto& [key, wire] = *next++;
+    if (!wire.waiting) continue;
+    last_flushed_ = key;
+    send_waiting_value(key, wire, now);
     if (connection_.queued_bytes() >= wire_high_mark) return;
   }
 }

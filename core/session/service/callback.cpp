@@ -18,6 +18,8 @@ std::uint32_t request_id_of(CallbackId id) {
 Result<CallbackId> ServiceSession::call_callback(std::string_view path, const MemberDefinition& member,
                                                  std::span<const Value> arguments, Now now) {
   if (!service_) return make_error(ErrorCode::connection_error, "no client is connected");
+  if (!may_use_service())
+    return make_error(ErrorCode::authentication_error, "callback '" + member.name + "': the client has not logged in");
   if (callbacks_.size() >= options_.max_open_callbacks)
     return make_error(ErrorCode::out_of_system_resource, "callback '" + member.name +
                                                              "': " + std::to_string(options_.max_open_callbacks) +

@@ -174,9 +174,10 @@ void ServiceSession::leave_locks() {
 
 void ServiceSession::set_user(std::optional<AuthenticatedUser> user, Now now) {
   auto& locks = service_->object_locks();
-  if (user_) locks.handle_logout(user_->name, session_id_);
+  const bool is_same = user_ && user && user_->name == user->name;  // who keeps what is locked
+  if (user_ && !is_same) locks.handle_logout(user_->name, session_id_);
   user_ = std::move(user);
-  if (user_) locks.handle_login(user_->name);
+  if (user_ && !is_same) locks.handle_login(user_->name);
   if (may_use_service()) return;
   // Logged out of a service that requires a user: what was connected until now ends, too.
   leave_monitors();

@@ -432,6 +432,7 @@ class ServiceSession {
   std::unordered_map<std::uint32_t, std::shared_ptr<RequestPass>> passes_;  ///< of requests, until they are answered
   GeneratorTable generators_;
   Wires wires_;
+  PathMember last_flushed_;         ///< of wires_: the next flush goes on behind it
   std::unique_ptr<Ledgers> ended_;  ///< of wires and pipes that are no more; null: there were none
   /// A DisconnectClient that is not answered yet.
   struct OpenLeave {

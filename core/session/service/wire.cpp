@@ -41,13 +41,20 @@ Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& pack
   return sent;
 }
 
+/// In turns: a wire that fills the stream again and again does not hold up those that sort behind it.
 void ServiceSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
+  if (!may_use_service()) return;
+  auto next = wires_.upper_bound(last_flushed_);
+  for (auto left = wires_.size(); left > 0; --left) {
+    if (next == wires_.end()) next = wires_.begin();
+    auto& [key, wire] = *next++;
+    if (!wire.waiting || wire.state == WireState::connecting) continue;
+    last_flushed_ = key;
     const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
     WirePacket packet(key.path, *wire.member, value, time, wire.waiting_since);
-    // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(wire, packet, now) || connection_.queued_bytes() >= wire_high_mark) return;
+    // What can fail is a value that does not fit, which others don't wait for, or the session, with all its wires.
+    (void)send_wire_packet(wire, packet, now);
+    if (!service_ || connection_.queued_bytes() >= wire_high_mark) return;
   }
 }
 
@@ -101,7 +108,11 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
   if (entry.type == EntryType::wire_disconnect_req) {
     const auto wire = wires_.find(key);
     if (wire == wires_.end()) return make_error(ErrorCode::service_error, "Invalid wire connection");
-    end_wire(wire);
+    if (wire->second.state == WireState::connecting)
+      answer_wire(key.path, member, make_error(ErrorCode::operation_aborted, "the wire was disconnected"), now);
+    else
+      end_wire(wire);
+    if (!service_) return {};  // the answer could not be sent
     events_.push(WireDisconnected{key.path, &member});
     begin_reply(entry);
     send_outgoing(now);
@@ -110,13 +121,22 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
   if (wires_.size() >= options_.max_wires && !wires_.contains(key))
     return make_error(ErrorCode::out_of_system_resource,
                       "this client has " + std::to_string(options_.max_wires) + " wires connected already");
-  // A second request of a connected client is accepted: it is the same connection.
+  // A second request of a connected client is accepted: it is the same connection. One of a client that still waits is
+  // answered in place of the first.
   const bool is_remote = service_->is_remote();
   WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
   fresh.object_use = service_->use_object(key.path);
-  const bool is_new = wires_.try_emplace(key, fresh).second;
+  const auto [wire, is_new] = wires_.try_emplace(key, fresh);
   if (is_new && is_remote) {
     events_.push(WireConnected{key.path, found.object, &member});
+    return {};
+  }
+  if (!is_new && wire->second.state == WireState::connecting) {
+    connection_.begin_message(outgoing_);
+    outgoing_.begin_entry(EntryType::wire_connect_ret, key.path, member.name,
+                          std::exchange(wire->second.request_id, entry.request_id));
+    write_error(outgoing_, make_error(ErrorCode::operation_aborted, "the wire was asked for anew"));
+    send_outgoing(now);
     return {};
   }
   begin_reply(entry);

@@ -303,6 +303,21 @@ TEST_CASE("a user lock ends with the last session of the user") {
   CHECK(all.get(bob));
 }
 
+TEST_CASE("a user who logs in again keeps what is locked") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  CHECK(all.lock(alice, LockKind::user, "arm.tool"));
+  CHECK(all.lock(alice, LockKind::client, "arm.slots[1]"));
+  CHECK(all.ask(alice, alice.client->authenticate("alice", Value(MapString{}), all.now())));
+  for (const auto* path : {"arm.tool", "arm.slots[1]"}) {
+    CHECK(all.get(alice, "name", path));
+    CHECK(why(all.get(bob, "name", path)) == "151 Object locked by alice");
+  }
+  all.drop(alice);
+  CHECK(all.service().object_locks().empty());
+}
+
 TEST_CASE("who may not lock, and where nobody may") {
   Clients all;
   auto& nobody = all.add("");
@@ -474,6 +489,43 @@ TEST_CASE("urgent messages go ahead of what waits, in their own order") {
   CHECK(pair.next_service<Called>().member->name == "alarm");
   CHECK(pair.next_service<Called>().member->name == "speed");
   CHECK(ordinary < urgent);
+}
+
+TEST_CASE("an urgent message waits for no others than the one that is being written") {
+  Loopback pair;
+  pair.connect();
+  const auto alarm = [&] { pair.client->set_property("arm", "alarm", Value(std::int32_t{1}), pair.now); };
+  const auto receive = [&](ByteSpan bytes) { pair.service->handle_bytes(bytes, pair.now); };
+  std::vector<std::string> received;
+  const auto drain = [&] {
+    pair.carry(*pair.client, *pair.service, 1u << 20);
+    while (const auto event = pair.service->poll_event()) received.push_back(std::get<Called>(*event).member->name);
+  };
+  SECTION("of which the stream took a part") {
+    for (int i = 0; i < 3; ++i) pair.client->set_property("arm", "speed", Value(1.0), pair.now);
+    receive(pair.client->poll_transmit().front().first(5));
+    pair.client->handle_transmitted(5, pair.now);
+    alarm();
+    drain();
+    CHECK(received == std::vector<std::string>{"speed", "alarm", "speed", "speed"});
+  }
+  SECTION("which was handed out") {
+    const Value pose(
+        Structure{"experimental.loopback.Pose", {{"x", Value(1.0)}, {"joints", Value(std::vector<double>(50'000))}}});
+    for (int i = 0; i < 3; ++i) pair.client->set_property("arm", "pose", pose, pair.now);
+    const auto slices = pair.client->poll_transmit();
+    alarm();
+    std::size_t size = 0;
+    for (const auto slice : slices) {
+      const auto part = slice.first(std::min(slice.size(), TransmitQueue::write_size - size));
+      receive(part);
+      size += part.size();
+    }
+    CHECK(size == TransmitQueue::write_size);
+    pair.client->handle_transmitted(size, pair.now);
+    for (int i = 0; i < 3; ++i) drain();
+    CHECK(received == std::vector<std::string>{"pose", "alarm", "pose", "pose"});
+  }
 }
 
 TEST_CASE("a lock or monitor that is granted when its client has given it up is given back") {

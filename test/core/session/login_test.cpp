@@ -262,6 +262,31 @@ TEST_CASE("notices of the service are for those who have logged in") {
   CHECK(pair.service->wants_close());
 }
 
+TEST_CASE("callbacks are for those who have logged in") {
+  Guarded pair(true);
+  pair.start(login("alice", password("secret"), no_combined()));
+  pair.next_service<ClientConnected>();
+  const auto& notice = *pair.service->service()->root_type().find_member("notice");
+  const auto call = [&] {
+    return pair.service->call_callback("arm", notice, std::vector<Value>{Value(std::int32_t{1})}, pair.now);
+  };
+  const auto expect_refused = [&] {
+    const auto called = call();
+    REQUIRE_FALSE(called);
+    CHECK(called.error().code == ErrorCode::authentication_error);
+    CHECK(called.error().message == "callback 'notice': the client has not logged in");
+    CHECK(pair.service->poll_transmit().empty());
+  };
+  expect_refused();
+  pair.judge();
+  pair.next_client<Connected>();
+  CHECK(call());
+  pair.pump();
+  pair.next_client<CallbackCalled>();
+  CHECK(pair.completion(pair.client->logout(pair.now)));
+  expect_refused();
+}
+
 TEST_CASE("whoever logs out of a service that requires a user has nothing connected any more") {
   Guarded pair(true);
   pair.start(login("alice", password("secret")));

@@ -55,6 +55,7 @@ object Arm
   wire double aim
   wire double torque
   wire Pose state [readonly]
+  wire Pose plan
   pipe double samples
   memory double[] data
   memory int16[*] grid

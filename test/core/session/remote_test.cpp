@@ -187,6 +187,41 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
   }
 }
 
+TEST_CASE("a wire that a remote service has not connected yet is asked for anew, or given up") {
+  Remote pair;
+  const auto first = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.pump();
+  pair.next_service<WireConnected>();
+  const auto& torque = pair.member("torque");
+  SECTION("anew: the last request is the one that is answered") {
+    const auto second = pair.client->connect_wire("arm", "torque", pair.now);
+    const auto aborted = pair.completion(first).error();
+    CHECK(aborted.code == ErrorCode::operation_aborted);
+    CHECK(aborted.message == "the wire was asked for anew");
+    CHECK_FALSE(pair.client->poll_event());
+    CHECK_FALSE(pair.service->poll_event());
+    SECTION("it is connected") {
+      pair.service->answer_wire("arm", torque, {}, pair.now);
+      CHECK(pair.completion(second));
+      CHECK(pair.client->send_wire("arm", "torque", Value(1.0), pair.now));
+    }
+    SECTION("it is refused") {
+      pair.service->answer_wire("arm", torque, make_error(ErrorCode::object_locked_error, "locked"), pair.now);
+      CHECK(pair.completion(second).error().code == ErrorCode::object_locked_error);
+      CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+    }
+  }
+  SECTION("given up: the request is answered first") {
+    const auto disconnecting = pair.client->disconnect_wire("arm", "torque", pair.now);
+    const auto aborted = pair.completion(first).error();
+    CHECK(aborted.code == ErrorCode::operation_aborted);
+    CHECK(aborted.message == "the wire was disconnected");
+    CHECK(pair.completion(disconnecting));
+    CHECK(pair.next_service<WireDisconnected>().path == "arm");
+    CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+  }
+}
+
 TEST_CASE("what subscriptions had stays counted when they are over") {
   Remote pair;
   const auto connect = [&] {

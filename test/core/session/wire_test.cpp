@@ -13,6 +13,29 @@ Value pose(double x) {
   return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
 }
 
+/// Alone more than wire_high_mark.
+Value large_pose(double x) {
+  return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>(10'000))}}};
+}
+
+/// The wires `aim`, `plan` and `torque` are connected, and no events wait.
+void connect_wires(Loopback& pair) {
+  pair.connect();
+  for (const auto* wire : {"aim", "plan", "torque"})
+    pair.completion(pair.client->connect_wire("arm", wire, pair.now)).value();
+  while (pair.service->poll_event()) {
+  }
+}
+
+/// Of the events that wait, those that bring a number: `plan` has poses.
+template <class Received, class Session>
+int count_torques(Session& session) {
+  int count = 0;
+  while (const auto event = session.poll_event())
+    if (const auto* received = std::get_if<Received>(&*event)) count += received->value.template to<double>() ? 1 : 0;
+  return count;
+}
+
 }  // namespace
 
 TEST_CASE("the reply to a connect connects no wire that was asked for after it") {
@@ -216,4 +239,81 @@ TEST_CASE("a wire whose object is replaced while it is being connected fails, an
   CHECK(pair.next_service<WireDisconnected>().path == "arm.tool");
   CHECK_FALSE(pair.service->has_wire("arm.tool", "force"));
   CHECK_FALSE(pair.client->poll_event());
+}
+
+TEST_CASE("a wire of large values does not hold up those that sort behind it") {
+  Loopback pair;
+  connect_wires(pair);
+  const auto* type = pair.client->object_type("arm");
+  const auto& plan = *type->find_member("plan");
+  SECTION("to the client") {
+    REQUIRE(pair.service->send_wire("arm", plan, large_pose(0), pair.now));
+    REQUIRE(pair.service->send_wire("arm", *type->find_member("torque"), Value(2.0), pair.now));
+    for (int i = 1; i < 5; ++i) {
+      REQUIRE(pair.service->send_wire("arm", plan, large_pose(i), pair.now));
+      pair.carry(*pair.service, *pair.client, 1u << 20);
+    }
+    CHECK(count_torques<WireValueReceived>(*pair.client) == 1);
+  }
+  SECTION("to the service") {
+    REQUIRE(pair.client->send_wire("arm", "plan", large_pose(0), pair.now));
+    REQUIRE(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+    for (int i = 1; i < 5; ++i) {
+      REQUIRE(pair.client->send_wire("arm", "plan", large_pose(i), pair.now));
+      pair.carry(*pair.client, *pair.service, 1u << 20);
+    }
+    CHECK(count_torques<WireReceived>(*pair.service) == 1);
+  }
+}
+
+TEST_CASE("a service's value that does not fit holds up no other wire while the stream is slow") {
+  Loopback pair;
+  connect_wires(pair);
+  const auto* type = pair.client->object_type("arm");
+  REQUIRE(pair.service->send_wire("arm", *type->find_member("plan"), large_pose(0), pair.now));
+  REQUIRE(pair.service->send_wire("arm", *type->find_member("aim"), Value("text"), pair.now));
+  REQUIRE(pair.service->send_wire("arm", *type->find_member("torque"), Value(2.0), pair.now));
+  pair.pump();
+  CHECK(count_torques<WireValueReceived>(*pair.client) == 1);
+}
+
+TEST_CASE("the last value of a wire is sent before what ends the wire") {
+  Loopback pair;
+  connect_wires(pair);
+  pair.client->set_property("arm", "pose", large_pose(0), pair.now);
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));  // waits
+  SECTION("which is its disconnect") {
+    pair.client->disconnect_wire("arm", "torque", pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(2.0));
+    pair.next_service<WireDisconnected>();
+  }
+  SECTION("which is the end of the session") {
+    pair.client->disconnect(pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(2.0));
+    pair.next_service<ClientGone>();
+  }
+}
+
+TEST_CASE("a value that waits for the stream is not sent behind a newer one that is poked") {
+  Loopback pair;
+  connect_wires(pair);
+  pair.client->set_property("arm", "pose", large_pose(0), pair.now);
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(1.0), pair.now));  // waits
+  SECTION("but replaced by it") {
+    pair.client->poke_out_value("arm", "torque", Value(2.0), pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<Called>().arguments == std::vector<Value>{Value(2.0)});
+  }
+  SECTION("one that does not fit replaces nothing") {
+    pair.client->poke_out_value("arm", "torque", Value("text"), pair.now);
+    pair.pump();
+    pair.next_service<Called>();
+    CHECK(pair.next_service<WireReceived>().value == Value(1.0));
+  }
+  CHECK_FALSE(pair.service->poll_event());
 }

@@ -133,6 +133,22 @@ TEST_CASE("what a stream takes at once is counted as payload, and a frame's rest
   }
 }
 
+TEST_CASE("a frame's rest may be written in parts") {
+  Pair pair(GENERATE(WebSocketRole::client, WebSocketRole::server));
+  pair.budget = 7;
+  const std::string_view text = "payload";
+  const auto written = pair.try_write(text);
+  REQUIRE(written < 7);
+  REQUIRE(written > 0);
+  for (auto rest = text.substr(written); !rest.empty();) {
+    const auto part = rest.substr(0, 2);
+    pair.write(part);
+    rest = rest.substr(part.size());
+  }
+  pair.write("next");
+  CHECK(pair.read_far() == "payloadnext");
+}
+
 TEST_CASE("a pong waits for the end of a frame that is written in part") {
   Pair pair(WebSocketRole::server);
   pair.budget = 5;
