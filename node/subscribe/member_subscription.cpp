@@ -19,6 +19,14 @@ std::weak_ptr<Follower> weak_of(Follower& follower) {
 MemberFollower::MemberFollower(std::shared_ptr<SubscriptionCore> core, std::string member, std::string path)
     : core_(std::move(core)), member_(std::move(member)), path_(std::move(path)), waiters_(core_->io_context()) {}
 
+/// Of a subscription that is closed nothing comes any more.
+void MemberFollower::start() {
+  if (core_->is_closed())
+    is_closed_ = true;
+  else
+    core_->follow(shared_from_this());
+}
+
 void MemberFollower::close() {
   if (is_closed_) return;
   const auto keep = shared_from_this();
@@ -198,11 +206,10 @@ Result<> PipeFollower::send_to(const Place& place, const Value& value) {
 void PipeFollower::keep(std::deque<ReceivedValue>& queue, ReceivedValue value) {
   if (const auto handler = received) return handler(value);
   if (!waiters().is_empty()) return waiters().complete_first(std::move(value));
-  if (queue.size() == limit_) {
-    queue.pop_front();
-    ++dropped;
-  }
   queue.push_back(std::move(value));
+  if (queue.size() <= limit_) return;
+  queue.pop_front();
+  ++dropped;
 }
 
 }  // namespace rr::detail

@@ -34,7 +34,7 @@ class MemberFollower : public SubscriptionFollower, public std::enable_shared_fr
   /// `path`  of the object: "*" is the root, "*.arm" one of its object references.
   MemberFollower(std::shared_ptr<SubscriptionCore> core, std::string member, std::string path);
 
-  void start() { core_->follow(shared_from_this()); }
+  void start();
   void close();
   bool is_closed() const { return is_closed_; }
   std::size_t connected_count() const;

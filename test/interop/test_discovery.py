@@ -178,9 +178,9 @@ def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_p
     serve(start, "ours", 2, "home.other", IDS[4])
     gateway = start(3, BUILD / "server" / "rrgate", "serve", "--config", config)
 
-    def ask(what, is_wanted):
+    def ask(what, is_wanted, port=8080):
         deadline = time.monotonic() + FIND_DEADLINE + 5
-        while not is_wanted(answer := network.get_json(3, f"http://127.0.0.1:8080/api/v1/{what}")):
+        while not is_wanted(answer := network.get_json(3, f"http://127.0.0.1:{port}/api/v1/{what}")):
             assert time.monotonic() < deadline, f"{answer}\n{gateway.description()}"
         return answer
 
@@ -193,6 +193,14 @@ def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_p
     nodes = ask("discovery", lambda answer: len(answer["nodes"]) == 4)["nodes"]
     assert {node["node_name"]: node["allowed"] for node in nodes} == {**dict.fromkeys(names, True), "home.other": False}
     assert all(node["age"] < 20 and "%eth0]" in node["urls"][0]["url"] for node in nodes)
+    # Who may use other services alone sees of a node that it is there.
+    guests = tmp_path / "guests.json"
+    rules = [{"roles": ["guest"], "services": ["other"], "may": ["read"]}]
+    guests.write_text(json.dumps({**json.loads(config.read_text()), "listen": ["127.0.0.1:8081"],
+                                  "access": {"anonymous_role": "guest", "rules": rules}}))
+    start(3, BUILD / "server" / "rrgate", "serve", "--config", guests)
+    seen = ask("discovery", lambda answer: answer and len(answer["nodes"]) == 3, 8081)["nodes"]
+    assert [node["services"] for node in seen] == [[]] * 3
     # One that restarts on another port stays the same device.
     theirs.process.kill()
     theirs.process.wait()

@@ -249,7 +249,9 @@ def test_requests_of_http_show_the_key_of_their_lease(site):
     assert ask(site.port, "POST", PLAIN + "?lease=renew", headers=key).status == 204
     assert ask(site.port, "POST", PLAIN + "?lease=release", headers=key).status == 204
     wait_for(lambda: is_safe(arm))
-    assert ask(site.port, "PUT", PLAIN + "/speed", 1, key).status == 423
+    late = ask(site.port, "PUT", PLAIN + "/speed", 1, key)
+    assert late.status == 423 and "the lease of this Rrgate-Lease has ended" in late.json["detail"]
+    assert ask(site.port, "GET", PLAIN + "/speed", headers=key).status == 200
     ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=200")
     wait_for(lambda: ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=200").status == 200, 2)
     for query in ("lease=borrow", "lease=acquire", "lease=acquire&deadman=soon", "lease=acquire&deadman=5"):

@@ -1,6 +1,7 @@
 #include "server/http/endpoints/discovery.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include "server/json/json.hpp"
 #include "server/state/gateway_state.hpp"
@@ -11,22 +12,28 @@ namespace {
 
 using Json = rr::OrderedJson;
 
-Json describe_services(const FoundDevices::Entry& entry) {
+/// Whether who asks may know of a service.
+using Sees = std::function<bool(const std::string& service)>;
+
+Json describe_services(const FoundDevices::Entry& entry, const Sees& sees) {
   Json out = Json::array();
   if (entry.device && entry.device->identity()) {
     for (const auto& service : entry.device->identity()->services)
-      out.push_back({{"name", service.name}, {"type", service.type}, {"implements", service.implements}});
+      if (sees(service.name))
+        out.push_back({{"name", service.name}, {"type", service.type}, {"implements", service.implements}});
   } else if (entry.services) {
     for (const auto& service : *entry.services)
-      out.push_back(
-          {{"name", service.name}, {"type", service.root_object_type}, {"implements", service.root_object_implements}});
+      if (sees(service.name))
+        out.push_back({{"name", service.name},
+                       {"type", service.root_object_type},
+                       {"implements", service.root_object_implements}});
   } else {
     return nullptr;
   }
   return out;
 }
 
-Json describe(const FoundDevices::Entry& entry, std::chrono::steady_clock::time_point now) {
+Json describe(const FoundDevices::Entry& entry, const Sees& sees, std::chrono::steady_clock::time_point now) {
   const auto age = [now](const rr::NodeDiscoveryUrl& url) {
     return std::chrono::duration_cast<std::chrono::seconds>(now - url.last_announce).count();
   };
@@ -38,7 +45,7 @@ Json describe(const FoundDevices::Entry& entry, std::chrono::steady_clock::time_
   const auto newest = std::max_element(entry.node.urls.begin(), entry.node.urls.end(),
                                        [](const auto& a, const auto& b) { return a.last_announce < b.last_announce; });
   out["age"] = age(*newest);  // a node has at least one URL
-  out["services"] = describe_services(entry);
+  out["services"] = describe_services(entry, sees);
   out["allowed"] = entry.is_allowed;
   out["device"] = nullptr;
   if (entry.device) out["device"] = entry.device->config().name;
@@ -57,9 +64,13 @@ Handler discovery_endpoint(GatewayState& gateway) {
     out["enabled"] = found != nullptr;
     out["nodes"] = Json::array();
     if (found)
-      for (const auto& entry : found->list())
+      for (const auto& entry : found->list()) {
+        const auto sees = [&](const std::string& service) {
+          return sees_all || (entry.device && access.sees(request.identity, entry.device->config().name, service));
+        };
         if (sees_all || (entry.device && access.sees(request.identity, entry.device->config().name)))
-          out["nodes"].push_back(describe(entry, now));
+          out["nodes"].push_back(describe(entry, sees, now));
+      }
     return json_response(200, out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
   };
 }

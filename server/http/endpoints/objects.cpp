@@ -239,6 +239,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   auto from = writer.request().origin();
   auto asked = device->shared_from_this();
   const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
+  const bool is_urgent = is_urgent_member(*device, segments);
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
@@ -246,9 +247,16 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     auto used = *client;
     if (const auto lease = writer.request().header(lease_header); !lease.empty()) {
       const auto holder = gateway.lease_holders().find(lease);
-      // A key that is none any more: its commands are those of a client without a lease.
-      if (holder != gateway.lease_holders().end() && holder->second.client->upstream() == used->upstream())
-        used = holder->second.client;
+      const bool is_known = holder != gateway.lease_holders().end();
+      // What was sent under a lease moves nothing once it has ended, though nobody else has one.
+      if (!is_known && !request.is_read() && !request.option("lease") && !is_urgent) {
+        const auto ended = rr::make_error(rr::ErrorCode::object_locked_error,
+                                          "the lease of this Rrgate-Lease has ended: take it again");
+        const auto response = request.error_response(ended, nullptr);
+        co_await writer.send(response);
+        co_return;
+      }
+      if (is_known && holder->second.client->upstream() == used->upstream()) used = holder->second.client;
     }
     std::optional<rr::Error> unseen;
     LookJudge may_look = [&](const AccessRequest& object) {

@@ -290,6 +290,15 @@ TEST_CASE("closing a subscription ends what waits for it, wherever it is") {
       failure = exception.error();
     }
     CHECK(failure.code == ErrorCode::invalid_operation);
+    auto late = lamps.wire("light");
+    CHECK(late.is_closed());
+    try {
+      failure = {};
+      co_await late.next();
+    } catch (const ClientException& exception) {
+      failure = exception.error();
+    }
+    CHECK(failure.code == ErrorCode::invalid_operation);
   });
   CHECK(ends == std::vector<std::string>{"light: the subscription is closed", "the subscription is closed"});
 }
@@ -366,6 +375,12 @@ TEST_CASE("packets that nobody takes are bounded: the oldest go") {
     CHECK(flashes.available() == 2);
     const auto packet = co_await flashes.next();
     CHECK(number(packet.value) == 6);
+    two.packet_limit = 0;
+    auto none = lamps.pipe("flashes", two);
+    while (none.connected_count() == 0) co_await client.get("level");
+    REQUIRE(none.send(5));
+    while (none.dropped() < 3) co_await client.get("level");
+    CHECK(none.available() == 0);
   });
 }
 

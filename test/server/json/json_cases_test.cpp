@@ -251,3 +251,8 @@ TEST_CASE("json: exceptions") {
   CHECK(write_json(error_to_json({ErrorCode::value_not_set, "no \xff"}, {})) ==
         "{\"error\":{\"name\":\"RobotRaconteur.ValueNotSet\",\"message\":\"no \xef\xbf\xbd\"}}");
 }
+
+TEST_CASE("what is no UTF-8 is replaced where a document is written") {
+  const rr::OrderedJson json{{"name", "F\xfchrung"}};
+  CHECK(rr::write_json(json) == "{\"name\":\"F\xef\xbf\xbdhrung\"}");
+}
