@@ -12,7 +12,7 @@ namespace rr {
 namespace {
 
 /// What boost::json::basic_parser calls. Numbers come with their digits: its own doubles are off by a bit at times.
-struct TextHandler {
+struct TextHandler {  // NOLINT(bugprone-exception-escape): as JsonBuilder
   using error_code = boost::system::error_code;
   using string_view = boost::json::string_view;
   static constexpr std::size_t max_object_size = std::size_t(-1);

@@ -12,7 +12,7 @@
 namespace rr {
 
 /// Puts a document together from what a parser meets; refuses keys that are there already.
-class JsonBuilder {
+class JsonBuilder {  // NOLINT(bugprone-exception-escape): of nlohmann, whose destructor allocates
  public:
   static constexpr std::size_t max_depth = 64;
 
