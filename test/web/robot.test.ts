@@ -209,7 +209,11 @@ describe("driver", () => {
     expect(calls).toHaveLength(2);
   });
   const refused = () =>
-    new RobotRaconteurError({ code: ErrorCode.PermissionDenied, name: "RobotRaconteur.PermissionDenied", message: "no" });
+    new RobotRaconteurError({
+      code: ErrorCode.PermissionDenied,
+      name: "RobotRaconteur.PermissionDenied",
+      message: "no",
+    });
   it("does not repeat a stop that is refused where it has moved nothing", async () => {
     const { calls, send } = connection();
     const told = vi.fn();
