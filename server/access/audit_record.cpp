@@ -66,7 +66,7 @@ std::string format_audit_event(const AuditEvent& event, std::chrono::system_cloc
   }
   add("trace", event.trace);
   add("detail", event.detail);
-  const auto text = out.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace);
+  const auto text = rr::write_json(out);
   return text.substr(1, text.size() - 2);
 }
 

@@ -31,7 +31,7 @@ Result<Json> read_cbor(ByteSpan bytes);
 /// As memory_of_json(), for read_cbor().
 std::size_t memory_of_cbor(ByteSpan bytes);
 
-/// Compact text. The strings in `json` are UTF-8.
+/// Compact text. What is no UTF-8 in the strings of `json` is written as U+FFFD.
 std::string write_json(const OrderedJson& json);
 Bytes write_cbor(const OrderedJson& json);
 

@@ -149,8 +149,7 @@ Response HttpAccess::refusal(const Request& request, const rr::Error& error) con
   rr::add_key(problem, "status") = status;
   rr::add_key(problem, "detail") = error.message;
   rr::add_key(problem, "error") = {{"name", error.qualified_name()}, {"message", error.message}};
-  auto response = text_response(status, "application/problem+json",
-                                problem.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace) + "\n");
+  auto response = text_response(status, "application/problem+json", rr::write_json(problem) + "\n");
   response.set("Cache-Control", "no-store");
   if (status == 401 && state.users && request.header("X-Requested-With").empty())
     response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");

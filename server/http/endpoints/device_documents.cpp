@@ -40,7 +40,7 @@ Response device_document(std::string_view document, std::string_view device, con
     out = thing_description(device, places, std::move(schemas));
     type = "application/td+json";
   }
-  return text_response(200, type, out.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n");
+  return text_response(200, type, rr::write_json(out) + "\n");
 }
 
 }  // namespace rrgate

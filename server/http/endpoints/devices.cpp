@@ -71,7 +71,7 @@ Handler devices_endpoint(GatewayState& gateway) {
     if (out["devices"].empty() && !access.is_open() && !request.identity.is_proven())
       return gateway.http_access().refusal(request, rr::make_error(rr::ErrorCode::permission_denied,
                                                                    "a client that is not logged in may see no device"));
-    return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    return json_response(200, rr::write_json(out) + "\n");
   };
 }
 
@@ -80,8 +80,7 @@ Response no_such_device(std::string_view name) {
 }
 
 Response describe_device(const Device& device, const Request& request, const Access& access) {
-  return json_response(
-      200, describe(device, request, access).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  return json_response(200, rr::write_json(describe(device, request, access)) + "\n");
 }
 
 Response list_subscriptions(GatewayState& gateway, const Identity& asker, const Device& device) {
@@ -105,7 +104,7 @@ Response list_subscriptions(GatewayState& gateway, const Identity& asker, const 
                     {"age_p50_ms", static_cast<double>(ledger.ages.quantile(0.5).count()) / 1000},
                     {"age_p99_ms", static_cast<double>(ledger.ages.quantile(0.99).count()) / 1000}});
   });
-  return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  return json_response(200, rr::write_json(out) + "\n");
 }
 
 Handler no_such_api_endpoint() {

@@ -71,7 +71,7 @@ Handler discovery_endpoint(GatewayState& gateway) {
         if (sees_all || (entry.device && access.sees(request.identity, entry.device->config().name)))
           out["nodes"].push_back(describe(entry, sees, now));
       }
-    return json_response(200, out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+    return json_response(200, rr::write_json(out) + "\n");
   };
 }
 

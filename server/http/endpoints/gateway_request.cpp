@@ -5,7 +5,7 @@
 namespace rrgate {
 
 Response json_answer(unsigned status, const rr::OrderedJson& json) {
-  return json_response(status, json.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace) + "\n");
+  return json_response(status, rr::write_json(json) + "\n");
 }
 
 rr::Error bad_request(std::string what) {

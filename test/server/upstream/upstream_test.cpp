@@ -80,12 +80,13 @@ LeaseConfig leases_with_stop() {
 }
 
 /// Has a lease of the whole service, by `upstream`.
-void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder) {
+void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
+                std::chrono::milliseconds deadman = 10s) {
   std::optional<bool> is_held;
   rr::LockWanted wanted;
   wanted.command = rr::LockCommand::acquire_lease;
   wanted.path = "bench";
-  wanted.timeout = 10s;
+  wanted.timeout = deadman;
   upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
   REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
   REQUIRE(*is_held);
@@ -453,14 +454,7 @@ TEST_CASE("a session that is lost because a lease has ended refuses whoever has 
     bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
     bench.run_until([&] { return !bench.upstream->is_open(); });
   };
-  std::optional<bool> is_held;
-  rr::LockWanted wanted;
-  wanted.command = rr::LockCommand::acquire_lease;
-  wanted.path = "bench";
-  wanted.timeout = 100ms;
-  bench.upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
-  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
-  REQUIRE(*is_held);
+  take_lease(bench, bench.upstream, holder, 100ms);
   std::this_thread::sleep_for(150ms);
   const auto asked = bench.ask(other, rr::CallKind::function, "bench", "stop");
   REQUIRE(asked->has_value());
