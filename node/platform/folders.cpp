@@ -1,6 +1,7 @@
 #include "node/platform/folders.hpp"
 
 #include <pwd.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -77,6 +78,19 @@ Result<fs::path> user_run_folder() {
   }
   constexpr std::array<Place, 2> places{{{"ROBOTRACONTEUR_USER_RUN_DIR", ""}, {"XDG_RUNTIME_DIR", "robotraconteur"}}};
   return first_of(places, "/tmp/robotraconteur-run-" + std::to_string(::getuid()));
+}
+
+Result<fs::path> make_user_run_folder() {
+  const auto run = user_run_folder();
+  if (!run) return run;
+  std::error_code error;
+  if (fs::create_directories(*run, error)) fs::permissions(*run, fs::perms::owner_all, error);
+  struct stat status {};
+  if (::stat(run->c_str(), &status) != 0)
+    return make_error(ErrorCode::system_resource_error, "create " + run->string() + ": " + error.message());
+  if (status.st_uid != ::geteuid())
+    return make_error(ErrorCode::system_resource_permission_denied, run->string() + " belongs to another user");
+  return run;
 }
 
 std::string user_name() {

@@ -15,6 +15,10 @@ namespace rr {
 /// Sockets and locks of this user's nodes. Below /tmp where there is no XDG_RUNTIME_DIR; then it must be the user's
 /// own. Errors   as above.
 [[nodiscard]] Result<std::filesystem::path> user_run_folder();
+/// The same, made for this user alone (mode 0700) where it is not there yet.
+/// Errors   those of user_run_folder(); system_resource_error: it can't be made; system_resource_permission_denied: it
+///          belongs to another user.
+[[nodiscard]] Result<std::filesystem::path> make_user_run_folder();
 [[nodiscard]] Result<std::filesystem::path> system_run_folder();
 /// What this machine's own nodes keep.
 [[nodiscard]] Result<std::filesystem::path> system_state_folder();

@@ -40,7 +40,7 @@ Result<fs::path> id_file(std::string_view name) {
 Result<NodeIdClaim> NodeIdClaim::take(std::string_view name) {
   if (!is_valid_node_name(name))
     return make_error(ErrorCode::invalid_argument, rr::quote(name) + " is not a node name");
-  const auto run = user_run_folder();
+  const auto run = make_user_run_folder();
   if (!run) return run.error();
   if (auto made = make_folder(*run / "nodeids"); !made) return made.error();
   auto lock = LockedFile::open(*run / "nodeids" / (std::string(name) + ".pid"));

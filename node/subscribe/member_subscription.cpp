@@ -3,6 +3,8 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "core/types/value_size.hpp"
+
 namespace rr::detail {
 
 namespace asio = boost::asio;
@@ -74,6 +76,7 @@ std::optional<Waiters<ReceivedValue>::Id> MemberFollower::wait_for_next(
   if (queue_.empty() && !is_closed_) return waiters_.add(std::move(done), timeout, shared_from_this());
   Result<ReceivedValue> result = make_error(ErrorCode::invalid_operation, member_ + ": the subscription is closed");
   if (!queue_.empty()) {
+    note_taken(queue_.front());
     result = std::move(queue_.front());
     queue_.pop_front();
   }
@@ -206,10 +209,17 @@ Result<> PipeFollower::send_to(const Place& place, const Value& value) {
 void PipeFollower::keep(std::deque<ReceivedValue>& queue, ReceivedValue value) {
   if (const auto handler = received) return handler(value);
   if (!waiters().is_empty()) return waiters().complete_first(std::move(value));
+  bytes_ += held_bytes(value.value);
   queue.push_back(std::move(value));
-  if (queue.size() <= limit_) return;
-  queue.pop_front();
-  ++dropped;
+  while (queue.size() > packet_limit_ || (queue.size() > 1 && bytes_ > byte_limit_)) {
+    note_taken(queue.front());
+    queue.pop_front();
+    ++dropped;
+  }
+}
+
+void PipeFollower::note_taken(const ReceivedValue& value) {
+  bytes_ -= held_bytes(value.value);
 }
 
 }  // namespace rr::detail

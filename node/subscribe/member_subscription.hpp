@@ -71,6 +71,8 @@ class MemberFollower : public SubscriptionFollower, public std::enable_shared_fr
   virtual Result<> send_to(const Place& place, const Value& value) = 0;
   /// Keeps what nobody waits for; `queue` is what waits for the user.
   virtual void keep(std::deque<ReceivedValue>& queue, ReceivedValue value) = 0;
+  /// The first of the queue goes to the user.
+  virtual void note_taken(const ReceivedValue&) {}
 
   void handle_received(PlaceId id, Value value, TimeSpec time);
   void handle_closed(PlaceId id);
@@ -107,8 +109,11 @@ class WireFollower final : public MemberFollower {
 
 class PipeFollower final : public MemberFollower {
  public:
-  PipeFollower(std::shared_ptr<SubscriptionCore> core, std::string member, std::string path, std::size_t limit)
-      : MemberFollower(std::move(core), std::move(member), std::move(path)), limit_(limit) {}
+  PipeFollower(std::shared_ptr<SubscriptionCore> core, std::string member, std::string path, std::size_t packet_limit,
+               std::size_t byte_limit)
+      : MemberFollower(std::move(core), std::move(member), std::move(path)),
+        packet_limit_(packet_limit),
+        byte_limit_(byte_limit) {}
   std::uint64_t dropped = 0;
 
  private:
@@ -116,8 +121,11 @@ class PipeFollower final : public MemberFollower {
   void disconnect(const Place& place) override;
   Result<> send_to(const Place& place, const Value& value) override;
   void keep(std::deque<ReceivedValue>& queue, ReceivedValue value) override;
+  void note_taken(const ReceivedValue& value) override;
 
-  std::size_t limit_;
+  std::size_t packet_limit_;
+  std::size_t byte_limit_;
+  std::size_t bytes_ = 0;  ///< of what waits
 };
 
 }  // namespace detail

@@ -46,8 +46,8 @@ WireSubscription ServiceSubscription::wire(std::string member, const MemberSubsc
 
 PipeSubscription ServiceSubscription::pipe(std::string member, const MemberSubscriptionOptions& options) const {
   check_path(options.path);
-  const auto follower =
-      std::make_shared<detail::PipeFollower>(core_, std::move(member), options.path, options.packet_limit);
+  const auto follower = std::make_shared<detail::PipeFollower>(core_, std::move(member), options.path,
+                                                               options.packet_limit, options.byte_limit);
   follower->start();
   return PipeSubscription(follower);
 }

@@ -25,8 +25,10 @@
 namespace rr {
 
 struct MemberSubscriptionOptions {
-  std::string path = "*";             ///< of the object: "*" is the root, "*.arm" one of its object references
-  std::size_t packet_limit = 10'000;  ///< that wait for PipeSubscription::next(); of more the oldest are dropped
+  std::string path = "*";  ///< of the object: "*" is the root, "*.arm" one of its object references
+  /// Of what waits for PipeSubscription::next(): of more the oldest are dropped, of bytes all but the newest.
+  std::size_t packet_limit = 10'000;
+  std::size_t byte_limit = 64u << 20;
 };
 
 /// A wire with the C++ type of generated classes; next() has the value as it came.

@@ -213,14 +213,9 @@ void clean_local_base(const fs::path& base, const fs::path& sockets) {
 }
 
 Result<LocalFolders> make_local_folders() {
-  const auto run = user_run_folder();
+  const auto run = make_user_run_folder();
   if (!run) return run.error();
   std::error_code error;
-  if (fs::create_directories(*run, error)) fs::permissions(*run, fs::perms::owner_all, error);
-  struct stat status {};
-  if (::stat(run->c_str(), &status) != 0) return file_error("create", *run, error.message());
-  if (status.st_uid != ::geteuid())
-    return make_error(ErrorCode::system_resource_permission_denied, run->string() + " belongs to another user");
   LocalFolders folders{*run / "transport" / "local", *run / "socket"};
   for (const auto& folder : {folders.base, folders.sockets}) {
     fs::create_directories(folder, error);

@@ -59,11 +59,16 @@ Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool ta
   };
   error_code error;
   tcp::resolver resolver(executor_);
+  // A name may stand for addresses of a family that this machine has not.
+  const auto is_not_here = [](const error_code& why) {
+    return why == std::errc::address_family_not_supported || why == std::errc::address_not_available;
+  };
   const auto endpoints = resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
   if (error) return fail(error);
   // A port that is free at one address may be taken at the next.
   for (int attempts = address.port == 0 ? 8 : 1; attempts > 0; --attempts) {
     std::vector<HostPort> bound;
+    error_code unusable;
     for (const auto& entry : endpoints) {
       auto endpoint = entry.endpoint();
       if (!bound.empty()) endpoint.port(bound.front().port);
@@ -74,11 +79,16 @@ Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool ta
         acceptor->set_option(asio::ip::v6_only(!(takes_both && endpoints.size() == 1)), error);
       if (!error) acceptor->bind(endpoint, error);
       if (!error) acceptor->listen(asio::socket_base::max_listen_connections, error);
+      if (is_not_here(error)) {
+        unusable = std::exchange(error, {});
+        continue;
+      }
       if (error) break;
       const auto local = acceptor->local_endpoint(error);
       bound.push_back({local.address().to_string(), local.port()});
       acceptors_.push_back(acceptor);
     }
+    if (!error && bound.empty()) error = unusable;
     if (!error) return bound;
     if (error != asio::error::address_in_use) break;
     close();
@@ -207,6 +217,16 @@ awaitable<Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uin
   }
   const auto executor = co_await asio::this_coro::executor;
   auto lookup = std::make_shared<Lookup>(executor);
+  if (host == "localhost") {  // no question for a name server
+    endpoints = {{asio::ip::address_v4::loopback(), port}, {asio::ip::address_v6::loopback(), port}};
+    co_return endpoints;
+  }
+  // What nobody waits for any more makes no others wait: all look-ups of a process go one after another.
+  struct Guard {
+    Lookup& lookup;
+    ~Guard() { lookup.resolver.cancel(); }
+  };
+  const Guard guard{*lookup};
   lookup->finished.expires_after(timeout);
   asio::co_spawn(executor, look_up(lookup, host, std::to_string(port)), asio::detached);
   co_await lookup->finished.async_wait(await_tuple);

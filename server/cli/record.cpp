@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "server/cli/ls.hpp"
 #include "server/cli/progress.hpp"
@@ -22,6 +23,7 @@
 namespace rrgate {
 
 namespace asio = boost::asio;
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -157,26 +159,58 @@ std::string summary(const RecordingWriter& writer, double seconds) {
   return out.str();
 }
 
+/// What is to be replaced is kept aside until there is something to replace it with; else it comes back.
+class FormerFile {
+ public:
+  explicit FormerFile(const std::string& path) : path_(path), aside_(path + ".before") {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return;
+    fs::rename(path, aside_, error);
+    if (error) throw std::runtime_error(path + ": can't be kept as " + aside_ + ": " + error.message());
+    is_aside_ = true;
+  }
+  FormerFile(const FormerFile&) = delete;
+  FormerFile& operator=(const FormerFile&) = delete;
+  ~FormerFile() {
+    std::error_code ignored;
+    if (is_aside_) fs::rename(aside_, path_, ignored);
+  }
+  void drop() {
+    std::error_code ignored;
+    if (std::exchange(is_aside_, false)) fs::remove(aside_, ignored);
+  }
+
+ private:
+  std::string path_;
+  std::string aside_;
+  bool is_aside_ = false;
+};
+
 int run_record(const RecordOptions& options) {
   const auto place = options.urls.size() == 1 ? options.urls.front() : options.output;
   return run_remote("record", place, [&] {
     std::error_code error;
-    if (!options.replaces && std::filesystem::exists(options.output, error))
+    if (!options.replaces && fs::exists(options.output, error))
       throw NotUnderstood(options.output + " is there already; --force replaces it");
     RecordingOptions how;
     how.max_bytes = static_cast<std::uint64_t>(options.max_size * 1e6);
     how.kept_files = options.kept_files;
     how.replaces = options.replaces;
     how.library = "rrgate " + std::string(version);
+    FormerFile former(options.output);
     auto writer = RecordingWriter::create(options.output, how);
     if (!writer) throw_failure(writer.error());
     RecordRun run(options, *writer);
     try {
       run.run();
     } catch (const std::exception&) {
-      if (writer->message_count() == 0) std::filesystem::remove(options.output, error);
+      if (writer->message_count() > 0)
+        former.drop();
+      else if (fs::is_regular_file(options.output, error))
+        fs::remove(options.output, error);
       throw;
     }
+    former.drop();
     if (options.is_json)
       print_json_line({{"file", options.output},
                        {"messages", writer->message_count()},

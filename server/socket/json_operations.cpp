@@ -235,6 +235,10 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
   auto used = co_await client();
   LookJudge may_look = [standing = place_.standing](const AccessRequest& object) { return standing->check(object); };
   auto target = value_or_throw(co_await find_target(used, segments, std::move(may_look)));
+  // Who comes back says the number of the last event that it had: all must have them from the client that all share.
+  const bool is_events =
+      operation.verb == Verb::subscribe && target->member && target->member->kind == rr::MemberKind::event;
+  if (is_events && used == own_) target->client = co_await shared_client();
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
@@ -275,6 +279,10 @@ rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {
     if (const auto opened = co_await own->upstream()->opened(); !opened) throw rr::Exception(opened.error());
     co_return own;
   }
+  co_return co_await shared_client();
+}
+
+rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::shared_client() {
   auto key = place_.key;
   auto from = place_.from;
   co_return value_or_throw(co_await open_session(gateway_, place_.device, std::move(key), std::move(from)));

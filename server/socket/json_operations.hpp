@@ -101,6 +101,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
   AuditEntryPtr admit(const Target& target, const Operation& operation);
   rr::awaitable<std::shared_ptr<ValueClient>> client();
+  rr::awaitable<std::shared_ptr<ValueClient>> shared_client();
   /// See LeaseConfig::is_urgent().
   bool is_urgent(const JsonRequest& request, const Operation& operation) const;
   void tell_error(const std::string& id, const rr::Error& error);

@@ -26,6 +26,8 @@ rr::DiscoveryOptions discovery_options(const Discover& discover) {
   rr::DiscoveryOptions options;
   options.ip = rr::IpDiscoveryScopes{has("node_local"), has("link_local"), has("site_local"), has("ipv4_broadcast")};
   if (discover.scopes.empty()) options.ip.reset();
+  // A node announces itself once a minute: one announcement that is lost does not make it gone.
+  options.cache.expiry = std::chrono::minutes(2);
   options.intra = false;  // none in this process
   options.local = discover.local;
   if (!discover.hardware) options.hardware.reset();

@@ -421,8 +421,8 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::
   if (!made) co_return made.error();
   const auto upstream = *made;  // NOLINT(performance-unnecessary-copy-initialization): kept while this waits
   const std::pair place(device->config().name, key);
-  entries_[place].last_opened = std::chrono::steady_clock::now();
-  if (!sweep_.is_armed()) sweep_.arm(idle_time / 3);
+  entries_[place].last_used = std::chrono::steady_clock::now();
+  if (!sweep_.is_armed()) sweep_.arm(idle_time_ / 3);
   const auto opened = co_await upstream->opened();
   const auto found = entries_.find(place);
   if (found == entries_.end() || found->second.upstream != upstream)
@@ -438,10 +438,12 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::
 
 void ValueClients::sweep() {
   const auto now = std::chrono::steady_clock::now();
+  for (auto& [place, entry] : entries_)
+    if (entry.client.use_count() > 1) entry.last_used = now;
   std::erase_if(entries_, [&](const auto& item) {
-    return item.second.client.use_count() == 1 && now - item.second.last_opened > idle_time;
+    return item.second.client.use_count() == 1 && now - item.second.last_used > idle_time_;
   });
-  if (!entries_.empty()) sweep_.arm(idle_time / 3);
+  if (!entries_.empty()) sweep_.arm(idle_time_ / 3);
 }
 
 void ValueClients::stop() {

@@ -207,8 +207,10 @@ struct SessionKey {
 class ValueClients {
  public:
   /// `memory`  see ValueClient.
-  ValueClients(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory)
-      : memory_(std::move(memory)), sweep_(executor, [this] { sweep(); }) {}
+  /// `idle_time`  how long a client stays that nobody uses.
+  ValueClients(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory,
+               std::chrono::milliseconds idle_time = std::chrono::seconds(30))
+      : memory_(std::move(memory)), idle_time_(idle_time), sweep_(executor, [this] { sweep(); }) {}
 
   /// A client of an open session. Errors   those of connecting and of the login; out_of_system_resource: too many at
   /// once, here or at the device; service_not_found.
@@ -224,7 +226,7 @@ class ValueClients {
     std::shared_ptr<Upstream> upstream;
     std::shared_ptr<ValueClient> client;  ///< null until the login was judged: it takes nobody's place before
     bool is_ours = true;                  ///< false: the upstream is that of the device's Robot Raconteur clients
-    std::chrono::steady_clock::time_point last_opened;
+    std::chrono::steady_clock::time_point last_used;
   };
   using Entries = std::map<std::pair<std::string, SessionKey>, Entry>;
   /// Of one that is not wanted any more. An upstream with a client ends with that.
@@ -235,10 +237,10 @@ class ValueClients {
   void sweep();
 
   static constexpr std::size_t max_clients = 256;
-  static constexpr std::chrono::seconds idle_time{30};
 
   MemoryBudget::Charge memory_;  ///< of nothing: those of the clients are its siblings
   Entries entries_;
+  std::chrono::milliseconds idle_time_;
   rr::Deadline sweep_;
   bool is_stopped_ = false;
 };

@@ -199,13 +199,32 @@ def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_p
     guests.write_text(json.dumps({**json.loads(config.read_text()), "listen": ["127.0.0.1:8081"],
                                   "access": {"anonymous_role": "guest", "rules": rules}}))
     start(3, BUILD / "server" / "rrgate", "serve", "--config", guests)
-    seen = ask("discovery", lambda answer: answer and len(answer["nodes"]) == 3, 8081)["nodes"]
+    seen = ask("discovery", lambda answer: answer and [node["services"] is None for node in answer["nodes"]] == [False] * 3, 8081)["nodes"]
     assert [node["services"] for node in seen] == [[]] * 3
     # One that restarts on another port stays the same device.
     theirs.process.kill()
     theirs.process.wait()
     serve(start, "theirs", 1, "lab.theirs", IDS[6], 50002)
     ask("devices", lambda answer: any(":50002/" in device["url"] and device["state"] == "online" for device in answer["devices"]))
+
+
+def test_localhost_is_served_by_a_machine_without_ipv6(network, start, tmp_path):
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": ["localhost:8082"], "devices": []}))
+    hosts = tmp_path / "hosts"
+    hosts.write_text("::1 localhost\n127.0.0.1 localhost\n")
+    off = "net.ipv6.conf.lo.disable_ipv6"
+    assert run(*network.on(3, "sysctl", "-w", f"{off}=1")).returncode == 0
+    try:
+        gateway = start(3, "unshare", "--mount", "sh", "-c", f"mount --bind {hosts} /etc/hosts && "
+                        f"exec {BUILD}/server/rrgate serve --config {config}")
+        deadline = time.monotonic() + 10
+        while not (answer := network.get_json(3, "http://127.0.0.1:8082/api/v1/devices")):
+            assert time.monotonic() < deadline, gateway.description()
+            time.sleep(0.05)
+        assert answer["devices"] == []
+    finally:
+        run(*network.on(3, "sysctl", "-w", f"{off}=0"))
 
 
 def node_that_dies_is_lost(network, start):

@@ -130,6 +130,15 @@ def test_events(page):
     assert [page.next(subscription=again)["number"] for _ in range(2)] == numbers[1:]
 
 
+def test_events_have_one_number_for_all_who_ask(gateway):
+    with Socket(gateway) as controller, Socket(gateway) as watcher:
+        controller.open("callback", "ask")  # what is its own now
+        both = [(each, each.open("subscribe", "changed")) for each in (watcher, controller)]
+        watcher.ask("call", "fire", args={"count": 1})
+        numbers = {each.next(subscription=changed)["number"] for each, changed in both}
+        assert len(numbers) == 1
+
+
 def test_wires(page):
     page.ask("call", "publish_state", args={"value": [1]})
     state = page.open("subscribe", "state")

@@ -292,6 +292,8 @@ def test_mistakes_are_told(create, of_create, tmp_path):
     assert "'nonesuch': no member to record; " in told and "DistanceTraveled" in told
     assert not path.exists()
     path.write_text("no recording")
+    assert "Connection refused" in rrgate("record", f"rr+tcp://127.0.0.1:{free_port()}/?service=a", "-o", path, "--force", code=3)
+    assert path.read_text() == "no recording" and sorted(tmp_path.iterdir()) == [path]
     for command in ("info", "replay"):
         assert "is no MCAP file: begins with" in rrgate(command, path, code=1)
     assert "can't be read: No such file" in rrgate("info", tmp_path / "none.mcap", code=1)

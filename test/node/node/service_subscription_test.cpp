@@ -381,6 +381,18 @@ TEST_CASE("packets that nobody takes are bounded: the oldest go") {
     REQUIRE(none.send(5));
     while (none.dropped() < 3) co_await client.get("level");
     CHECK(none.available() == 0);
+    MemberSubscriptionOptions few_bytes;
+    few_bytes.byte_limit = 1;
+    auto newest = lamps.pipe("flashes", few_bytes);
+    while (newest.connected_count() == 0) co_await client.get("level");
+    REQUIRE(newest.send(5));
+    while (newest.dropped() < 2) co_await client.get("level");
+    CHECK(newest.available() == 1);
+    const auto kept = co_await newest.next();
+    CHECK(number(kept.value) == 7);
+    REQUIRE(newest.send(8));
+    while (newest.dropped() < 4) co_await client.get("level");
+    CHECK(newest.available() == 1);
   });
 }
 

@@ -131,6 +131,7 @@ TEST_CASE("a name keeps its NodeID, for one node at a time") {
     CHECK_THAT(second.error().message, Contains("in use by another node"));
   }
   CHECK(NodeIdClaim::take("my.robot").value().id() == id);
+  CHECK(fs::status(*user_run_folder()).permissions() == fs::perms::owner_all);
   CHECK(NodeIdClaim::take("other.robot").value().id() != id);
   CHECK_FALSE(NodeIdClaim::take("../robot").has_value());
 

@@ -133,3 +133,27 @@ TEST_CASE("a login that is judged for a device that has been replaced is given u
   silent.close();
   CHECK(bench.run_until([&] { return second->has_value(); }));
 }
+
+TEST_CASE("what somebody listens by is idle only from when nobody does") {
+  Rack rack;
+  auto& bench = rack.bench;
+  auto config = bench.device->config();
+  config.mode = DeviceMode::relay;
+  const auto device = std::make_shared<Device>(bench.io.get_executor(), config, bench.config);
+  constexpr std::chrono::milliseconds idle_time(600);
+  ValueClients clients(bench.io.get_executor(), MemoryBudget(1'000'000).charge(""), idle_time);
+  const SessionKey key{"rack"};
+  auto used = bench.wait_for(clients.open(device, key)).value();
+  const std::weak_ptr<ValueClient> same = used;
+  const auto wait = [&](std::chrono::milliseconds time) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    (void)bench.run_until([&] { return std::chrono::steady_clock::now() >= end; });
+  };
+  wait(idle_time * 3 / 2);
+  used.reset();
+  wait(idle_time / 2);
+  CHECK(same.lock() == bench.wait_for(clients.open(device, key)).value());
+  REQUIRE(bench.run_until([&] { return same.expired(); }));
+  clients.stop();
+  device->stop();
+}
