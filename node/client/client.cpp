@@ -59,11 +59,19 @@ BlockingConnection::BlockingConnection(std::string_view url, ConnectOptions opti
 }
 
 BlockingConnection::~BlockingConnection() {
+  is_handling_ = true;  // no handler is called any more: what it refers to may be gone already
   close();
 }
 
 void BlockingConnection::run_for(std::chrono::milliseconds duration) {
   (void)run_until([] { return false; }, duration);
+  // Without any time, too, what has come is taken: a heartbeat, above all.
+  io_.restart();
+  for (int left = 64; left > 0 && !has_handlers(); --left) {
+    const Serving serving(is_serving_);
+    if (io_.poll_one() == 0) break;
+  }
+  run_handlers();
 }
 
 bool BlockingConnection::serve(std::optional<std::chrono::steady_clock::time_point> until) {

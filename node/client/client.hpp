@@ -36,7 +36,8 @@ class ClientException : public Exception {
 /// events, wires, pipes and callbacks are called then, on the thread that waits, one after another in the order of what
 /// they tell of. A handler may make requests and wait for them; the others are called when it has returned. What waits
 /// for handlers that take too long: of a wire the newest value, of the rest up to 65,536 calls and 64 MiB, above which
-/// the connection is closed. For one thread.
+/// the connection is closed. Nor are heartbeats answered in between: a service takes who waits here, or calls
+/// run_for(0ms), for less than once in 20 s for gone, and ends its locks. For one thread.
 class BlockingConnection {
  public:
   /// Throws   ClientException.

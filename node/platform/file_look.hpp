@@ -7,12 +7,15 @@
 
 namespace rr {
 
-/// What tells that a file was changed or replaced; empty where there is none.
+/// What tells that a file was changed or replaced, or given to somebody else; empty where there is none.
 inline std::string file_look(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) return {};
-  return std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec) + " " +
-         std::to_string(status.st_ino) + " " + std::to_string(status.st_size);
+  const auto text = [](const timespec& time) {
+    return std::to_string(time.tv_sec) + "." + std::to_string(time.tv_nsec);
+  };
+  return text(status.st_mtim) + " " + text(status.st_ctim) + " " + std::to_string(status.st_ino) + " " +
+         std::to_string(status.st_size);
 }
 
 }  // namespace rr

@@ -27,9 +27,23 @@ struct flock whole_file() {
 }  // namespace
 
 Result<LockedFile> LockedFile::open(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640);
+  for (int attempts = 10; attempts > 0; --attempts) {
+    auto file = open_once(path, O_CREAT);
+    if (!file || file->is_still_there()) return file;
+  }
+  return make_error(ErrorCode::system_resource_error, path.string() + " is removed again and again");
+}
+
+Result<LockedFile> LockedFile::open_left_behind(const fs::path& path) {
+  auto file = open_once(path, 0);
+  if (file && !file->is_still_there())
+    return make_error(ErrorCode::system_resource_error, path.string() + " was removed meanwhile");
+  return file;
+}
+
+Result<LockedFile> LockedFile::open_once(const fs::path& path, int flags) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0640);
   if (descriptor < 0) return make_error(ErrorCode::system_resource_error, "open " + path.string() + ": " + reason());
-  ::fchmod(descriptor, 0640);  // whatever the umask says: the group of a public node reads it
   LockedFile file(descriptor, path);
   auto lock = whole_file();
   if (::fcntl(descriptor, F_OFD_SETLK, &lock) != 0) {
@@ -37,7 +51,16 @@ Result<LockedFile> LockedFile::open(const fs::path& path) {
       return make_error(ErrorCode::system_resource_permission_denied, path.string() + " is in use by another node");
     return file.failure("lock");
   }
+  ::fchmod(descriptor, 0640);  // whatever the umask says: the group of a public node reads it
   return file;
+}
+
+/// Not where another node, as it cleaned up, removed the path between our opening and our lock.
+bool LockedFile::is_still_there() const {
+  struct stat mine {};
+  struct stat named {};
+  return ::fstat(descriptor_, &mine) == 0 && ::stat(path_.c_str(), &named) == 0 && mine.st_dev == named.st_dev &&
+         mine.st_ino == named.st_ino;
 }
 
 bool LockedFile::is_held(const fs::path& path) {

@@ -18,6 +18,8 @@ class LockedFile {
   /// Opens or creates it, mode 0640, and locks it. Its content stays as it is.
   /// Errors   system_resource_permission_denied: another node holds it; system_resource_error: it can't be opened.
   [[nodiscard]] static Result<LockedFile> open(const std::filesystem::path& path);
+  /// The same for a file that is there. Errors   also system_resource_error: it is not, or is removed meanwhile.
+  [[nodiscard]] static Result<LockedFile> open_left_behind(const std::filesystem::path& path);
   /// Whether somebody holds the lock of a file. Not there: no.
   static bool is_held(const std::filesystem::path& path);
 
@@ -35,6 +37,8 @@ class LockedFile {
 
  private:
   LockedFile(int descriptor, std::filesystem::path path) : descriptor_(descriptor), path_(std::move(path)) {}
+  static Result<LockedFile> open_once(const std::filesystem::path& path, int flags);
+  bool is_still_there() const;
   Error failure(const char* what) const;
 
   int descriptor_;

@@ -282,11 +282,11 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void release_path(const Service& service, const std::string& path) override {
     for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
   }
-  void call_callback(const Service& service, ClientId id, const std::string& path, const MemberDefinition& callback,
-                     std::span<const Value> arguments, CallbackDone done) override {
+  void call_callback(const Service& service, ClientId id, const std::vector<std::string>& paths,
+                     const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) override {
     const auto client = clients_.find(id);
     if (client != clients_.end() && client->second->service() == &service)
-      return client->second->call_callback(path, callback, arguments, std::move(done));
+      return client->second->call_callback(paths, callback, arguments, std::move(done));
     asio::post(io_, [done = std::move(done), name = callback.name] {
       done(make_error(ErrorCode::connection_error, "callback '" + name + "': the client is not connected"));
     });

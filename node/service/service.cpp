@@ -80,29 +80,30 @@ void Object::set_handler(std::string_view name, HandlerSlot slot, Handler handle
   const std::string where = type_name() + "." + member.name;
   const MemberDirection direction = member.direction();
   Member& mine = members_[&member];
+  const auto keep = [&] { return std::make_shared<const Handler>(std::move(handler)); };
   switch (slot) {
     case HandlerSlot::call:
       if (member.is_generator()) refuse(where + " is a generator function: it takes a handler of generator()");
       check_parameters(where, handler.parameters, member.parameters);
       check_result(where, handler.result, member.type);
-      mine.call = std::move(handler);
+      mine.call = keep();
       break;
     case HandlerSlot::get:
       if (direction == MemberDirection::writeonly) refuse(where + " is writeonly: it takes no get handler");
       check_parameters(where + " (get)", handler.parameters, {});
       check_result(where, handler.result, member.type);
-      mine.get = std::move(handler);
+      mine.get = keep();
       break;
     case HandlerSlot::set:
       if (direction == MemberDirection::readonly) refuse(where + " is readonly: it takes no set handler");
       check_parameters(where + " (set)", handler.parameters, {{"value", member.type}});
-      mine.set = std::move(handler);
+      mine.set = keep();
       break;
     case HandlerSlot::wire_received:
       if (direction == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
       if (handler.start) refuse(where + ": newer values do not wait for a handler, so it can't wait either");
       check_parameters(where, handler.parameters, {{"value", member.type}});
-      mine.wire_received = std::move(handler);
+      mine.wire_received = keep();
       break;
   }
 }
@@ -122,7 +123,7 @@ void Object::set_generator(std::string_view name, GeneratorHandler handler) {
     check_parameters(where + ", each step", handler.step_parameters, step_parameters);
     check_result(where + ", each step", handler.value, step_type(member.type));
   }
-  members_[&member].generator = std::move(handler);
+  members_[&member].generator = std::make_shared<const GeneratorHandler>(std::move(handler));
 }
 
 void Object::check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const {
@@ -149,9 +150,7 @@ void Object::call_callback(ClientId client, std::string_view callback, const std
   const MemberDefinition& member = require_member(callback, MemberKind::callback);
   check_arguments(member, "called", arguments);
   if (!service_.host_) refuse(type_name() + "." + member.name + ": the service is in no node");
-  const auto known_as = paths();
-  service_.host_->call_callback(service_, client, known_as.empty() ? service_.name_ : known_as.front(), member,
-                                arguments, std::move(done));
+  service_.host_->call_callback(service_, client, paths(), member, arguments, std::move(done));
 }
 
 WirePacket Object::pack_in_value(std::string_view wire, const Value& value, std::optional<TimeSpec> time) const {
@@ -254,7 +253,7 @@ std::vector<std::string> Object::missing_handlers() const {
     };
     const MemberDirection direction = member.direction();
     if (member.kind == MemberKind::function)
-      report(mine && (member.is_generator() ? bool(mine->generator.open) : bool(mine->call)), "function");
+      report(mine && (member.is_generator() ? mine->generator != nullptr : mine->call != nullptr), "function");
     if (member.kind == MemberKind::objref) report(mine && mine->find, "objref");
     if (member.kind != MemberKind::property) continue;
     if (direction != MemberDirection::writeonly) report(mine && mine->get, "get of property");
@@ -286,9 +285,9 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
 }
 
 std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& begin_late) {
-  const auto ask = [&](const Handler& handler) -> std::optional<Result<Value>> {
-    if (handler.call) return handler.call(called.arguments);
-    handler.start(std::move(called.arguments), begin_late());
+  const auto ask = [&](std::shared_ptr<const Handler> handler) -> std::optional<Result<Value>> {
+    if (handler->call) return handler->call(called.arguments);
+    handler->start(std::move(called.arguments), begin_late());
     return std::nullopt;
   };
   const auto missing = [&](std::string_view what) { return no_handler(what, *called.member); };
@@ -311,7 +310,8 @@ std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& beg
     case CallKind::poke_out: {
       Member& wire = mine ? *mine : members_[called.member];
       wire.out_value = called.arguments.front();
-      return wire.wire_received.call ? wire.wire_received.call(called.arguments) : Value{};
+      const auto received = wire.wire_received;
+      return received ? received->call(called.arguments) : Value{};
     }
     case CallKind::memory_dimensions:
     case CallKind::memory_read:
@@ -328,14 +328,14 @@ std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& beg
 
 Result<Generator> Object::open_generator(const Called& called) {
   const auto found = members_.find(called.member);
-  if (found != members_.end() && found->second.generator.open) return found->second.generator.open(called.arguments);
-  return no_handler("generator", *called.member);
+  const auto generator = found != members_.end() ? found->second.generator : nullptr;
+  return generator ? generator->open(called.arguments) : no_handler("generator", *called.member);
 }
 
 void Object::receive_wire(const WireReceived& received) {
   Member& wire = members_[received.member];
   wire.out_value = received.value;
-  if (wire.wire_received.call) (void)wire.wire_received.call({&received.value, 1});
+  if (const auto handler = wire.wire_received) (void)handler->call({&received.value, 1});
 }
 
 const Value* Object::in_value(const MemberDefinition& wire, ClientId client) const {

@@ -152,7 +152,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   /// Calls a callback of one client. `done` is called once, on the node's thread and not before this returns: with the
   /// client's answer (null for void callbacks) or error, or when it took too long or the client is gone; not any more
-  /// when the node is destroyed. An object that is known by several paths is called by the first.
+  /// when the node is destroyed. An object that is known by several paths is called by one that the client uses.
   /// Throws   std::invalid_argument: no such callback, wrong number of arguments or types.
   void call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
                      CallbackDone done);
@@ -195,29 +195,30 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   friend class ServiceClient;
 
   /// What the service has for one member.
+  using OnEndpoint = std::function<void(PipeEndpoint)>;
+  /// Handlers are shared with the call that runs them: they may set others in their own place.
   struct Member {
-    Handler call;                ///< functions
-    GeneratorHandler generator;  ///< generator functions
-    std::shared_ptr<const MemoryHandlers> memory;
-    Handler get;
-    Handler set;
-    Handler wire_received;
+    std::shared_ptr<const Handler> call = {};                ///< functions
+    std::shared_ptr<const GeneratorHandler> generator = {};  ///< generator functions
+    std::shared_ptr<const MemoryHandlers> memory = {};
+    std::shared_ptr<const Handler> get = {};
+    std::shared_ptr<const Handler> set = {};
+    std::shared_ptr<const Handler> wire_received = {};
     std::shared_ptr<const Value> in_value = {};                          ///< wires: what clients receive
     std::optional<TimeSpec> in_time = {};                                ///< wires: what set_wire() was given
     std::map<ClientId, Value> own_in_values = {};                        ///< wires: what single clients do instead
     std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
-    std::function<void(PipeEndpoint)> pipe_connected = {};
-    PacketHandler pipe_received = {};
-    std::function<void(PipeEndpoint)> pipe_closed = {};
+    std::shared_ptr<const OnEndpoint> pipe_connected = {};
+    std::shared_ptr<const PacketHandler> pipe_received = {};
+    std::shared_ptr<const OnEndpoint> pipe_closed = {};
     std::vector<PipeEndpoint> endpoints = {};  ///< pipes: open ones
   };
 
   Object(Service& service, const EntityDefinition& type) : service_(service), type_(&type) {}
   const MemberDefinition& require_member(std::string_view name, MemberKind kind) const;
   void set_handler(std::string_view name, HandlerSlot slot, Handler handler);
-  void set_pipe_handler(std::string_view name, std::function<void(PipeEndpoint)> Member::*slot,
-                        std::function<void(PipeEndpoint)> handler);
+  void set_pipe_handler(std::string_view name, std::shared_ptr<const OnEndpoint> Member::*slot, OnEndpoint handler);
   void set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler);
   std::size_t broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog);
   std::vector<PipeEndpoint> endpoints(std::string_view pipe);
@@ -264,7 +265,8 @@ class ServiceHost {
   virtual void send_wire(WirePacket& packet, const std::shared_ptr<const Value>& newest) = 0;
   virtual void send_wire_to(ClientId client, WirePacket& packet) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
-  virtual void call_callback(const Service& service, ClientId client, const std::string& path,
+  /// `paths`  of the object: the client is called by one that it uses.
+  virtual void call_callback(const Service& service, ClientId client, const std::vector<std::string>& paths,
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;
   virtual ClientId current_client() const = 0;
   virtual Caller find_client(ClientId id) const = 0;

@@ -325,9 +325,13 @@ void ServiceClient::end_pipe(PipeId id, bool tells_handler) {
 
 // --- callbacks ---
 
-void ServiceClient::call_callback(const std::string& path, const MemberDefinition& callback,
+void ServiceClient::call_callback(const std::vector<std::string>& paths, const MemberDefinition& callback,
                                   std::span<const Value> arguments, CallbackDone done) {
-  auto called = session_.call_callback(path, callback, arguments, read_clocks());
+  const auto used = std::find_if(paths.begin(), paths.end(), [&](const auto& path) { return session_.uses(path); });
+  const auto called = used != paths.end()
+                          ? session_.call_callback(*used, callback, arguments, read_clocks())
+                          : make_error(ErrorCode::object_not_found,
+                                       "callback '" + callback.name + "': the client does not use the object");
   if (called) {
     callbacks_.emplace(*called, CalledCallback{&callback, std::move(done)});
   } else {

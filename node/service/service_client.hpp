@@ -53,8 +53,8 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void send_event(EventPacket& packet);
   void send_wire(WirePacket& packet);
   void release_path(const std::string& path);
-  void call_callback(const std::string& path, const MemberDefinition& callback, std::span<const Value> arguments,
-                     CallbackDone done);
+  void call_callback(const std::vector<std::string>& paths, const MemberDefinition& callback,
+                     std::span<const Value> arguments, CallbackDone done);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// The owner goes away: nothing is told to it or to handlers any more.

@@ -6,9 +6,10 @@
 
 namespace rr {
 
-void Object::set_pipe_handler(std::string_view name, std::function<void(PipeEndpoint)> Member::*slot,
-                              std::function<void(PipeEndpoint)> handler) {
-  members_[&require_member(name, MemberKind::pipe)].*slot = std::move(handler);
+void Object::set_pipe_handler(std::string_view name, std::shared_ptr<const OnEndpoint> Member::*slot,
+                              OnEndpoint handler) {
+  auto& mine = members_[&require_member(name, MemberKind::pipe)].*slot;
+  mine = handler ? std::make_shared<const OnEndpoint>(std::move(handler)) : nullptr;
 }
 
 void Object::set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler) {
@@ -17,7 +18,7 @@ void Object::set_packet_handler(std::string_view name, HandlerType packet, Packe
   if (member.direction() == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
   if (!accepts(packet, member.type))
     refuse(where + ": packets are " + format_type(member.type) + ", the handler takes " + handler_type_text(packet));
-  members_[&member].pipe_received = std::move(handler);
+  members_[&member].pipe_received = std::make_shared<const PacketHandler>(std::move(handler));
 }
 
 std::size_t Object::broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog) {
@@ -43,20 +44,22 @@ std::vector<PipeEndpoint> Object::endpoints(std::string_view pipe) {
 
 void Object::connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint) {
   Member& mine = members_[&pipe];
-  if (mine.pipe_connected) mine.pipe_connected(endpoint);
+  if (const auto connected = mine.pipe_connected) (*connected)(endpoint);
   if (endpoint.is_open()) mine.endpoints.push_back(endpoint);
 }
 
 Result<> Object::receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet) {
   const auto found = members_.find(&pipe);
   if (found == members_.end() || !found->second.pipe_received) return {};
-  return found->second.pipe_received(endpoint, packet);
+  const auto received = found->second.pipe_received;
+  return (*received)(endpoint, packet);
 }
 
 void Object::close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler) {
   Member& mine = members_[&pipe];
   const bool was_connected = std::erase(mine.endpoints, endpoint) > 0;
-  if (tells_handler && was_connected && mine.pipe_closed) mine.pipe_closed(endpoint);
+  if (!tells_handler || !was_connected) return;
+  if (const auto closed = mine.pipe_closed) (*closed)(endpoint);
 }
 
 }  // namespace rr

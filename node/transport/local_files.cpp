@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <map>
 #include <system_error>
+#include <thread>
 
 #include "core/support/words.hpp"
 #include "node/platform/folders.hpp"
@@ -96,6 +98,11 @@ Result<LocalNodeFiles> LocalNodeFiles::take(const fs::path& base, const NodeIden
   const auto add = [&](const fs::path& pid, const fs::path& info) -> Result<> {
     for (const auto& [path, list] : {std::pair(pid, &files.pids_), std::pair(info, &files.infos_)}) {
       auto file = LockedFile::open(path);
+      // Another node that cleans up holds what is left of ours for a moment.
+      for (int attempts = 5; !file && attempts > 0; --attempts) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        file = LockedFile::open(path);
+      }
       if (!file) return file.error();
       list->push_back(std::move(*file));
     }
@@ -201,14 +208,15 @@ void clean_local_base(const fs::path& base, const fs::path& sockets) {
       if (entry.path().extension() == ".info") infos.push_back(entry.path());
   for (const auto& path : infos) {
     auto pid_path = path;
-    auto pid = LockedFile::open(pid_path.replace_extension(".pid"));
-    if (!pid) continue;
-    auto info = LockedFile::open(path);
+    pid_path.replace_extension(".pid");
+    auto pid = LockedFile::open_left_behind(pid_path);
+    if (!pid && fs::exists(pid_path, error)) continue;
+    auto info = LockedFile::open_left_behind(path);
     if (!info) continue;
     if (const auto found = read_info(path); found && fs::path(found->socket).parent_path() == sockets)
       fs::remove(found->socket, error);
     info->remove();
-    pid->remove();
+    if (pid) pid->remove();
   }
 }
 

@@ -174,6 +174,7 @@ rr::Result<> Access::replace(AccessStatePtr next) {
          {"hash", state.chain.hash},
          {"found", state.found}});
   }
+  if (std::exchange(is_loaded_, true)) record_changes(*next);
   take(std::move(next));
   seen_ = state_->looks;
   return {};
@@ -222,6 +223,11 @@ void Access::record_users(const AccessState& before, const AccessState& now) {
   }
 }
 
+void Access::record_changes(const AccessState& next) {
+  record_users(*state_, next);
+  record_tokens(*state_, next);
+}
+
 void Access::take(AccessStatePtr next) {
   if (next->ticket_key != state_->ticket_key) {
     const auto key = next->ticket_key.empty() ? rr::random_bytes(min_ticket_key) : next->ticket_key;
@@ -262,8 +268,7 @@ void Access::reload(bool is_forced) {
         {{"error", loaded.error().message}});
     return;
   }
-  record_users(*state_, **loaded);
-  record_tokens(*state_, **loaded);
+  record_changes(**loaded);
   take(std::move(*loaded));
   if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
 }

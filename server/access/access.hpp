@@ -126,10 +126,13 @@ class Access {
   explicit Access(const AccessConfig& config, const rr::Bytes& key);
   void take(AccessStatePtr next);
   /// What has come into the users file, and what has gone from it; the same of the tokens file.
+  /// What becomes of users and tokens with `next`.
+  void record_changes(const AccessState& next);
   void record_users(const AccessState& before, const AccessState& now);
   void record_tokens(const AccessState& before, const AccessState& now);
 
   AccessStatePtr state_;
+  bool is_loaded_ = false;
   std::map<std::string, std::string> seen_;
   std::shared_ptr<AuditLog> audit_;  ///< entries may outlive this
   std::shared_ptr<Users> users_;

@@ -22,8 +22,8 @@ enum class Recorded : std::uint8_t {
 /// open keeps one of these. For the gateway's thread; the Access outlives it.
 class Standing {
  public:
-  Standing(Access& access, Identity identity)
-      : access_(access), judged_by_(access.state_ptr()), identity_(std::move(identity)) {}
+  /// `identity`  may have been found some time ago: it is judged anew when it is first looked at.
+  Standing(Access& access, Identity identity) : access_(access), identity_(std::move(identity)) {}
 
   /// Whether what the client has shown is still good: it was not revoked, and has not expired. Once false, for ever.
   bool is_good();
@@ -58,7 +58,7 @@ class Standing {
   rr::Result<bool> judge(const AccessRequest& what, Recorded recorded);
 
   Access& access_;
-  AccessStatePtr judged_by_;
+  AccessStatePtr judged_by_;  ///< null: not yet
   Identity identity_;
   bool is_good_ = true;
   std::set<Place, ByPlace> noted_;  ///< what was recorded for the first time

@@ -219,14 +219,40 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (const auto problem = exposure(bound, next); !problem.empty() && !next.insecure)
     return rr::make_error(rr::ErrorCode::invalid_configuration, problem);
   bound.clear();
+  // Who listens on all addresses of a port is in the way of who wants one of them, and the other way round.
+  std::vector<rr::HostPort> yielded;
+  const auto fail = [&](const rr::Error& error) {
+    opened.clear();
+    for (const auto& address : yielded)
+      if (auto again = open(address, bound))
+        serve(std::move(*again));
+      else
+        log(LogLevel::error, "no longer listening", {{"error", again.error().message}});
+    return error;
+  };
   if (adopted_.empty())
     for (const auto& address : next.listen) {
       if (has(config_.listen, address)) continue;
       auto listener = open(address, bound);
-      if (!listener) return listener.error();
+      if (!listener) {
+        const auto is_in_the_way = [&](const Listener& other) {
+          return other.address.port == address.port && !has(next.listen, other.address);
+        };
+        for (auto it = listeners_.begin(); it != listeners_.end();) {
+          if (!is_in_the_way(*it)) {
+            ++it;
+            continue;
+          }
+          yielded.push_back(it->address);
+          it->socket->close();
+          it = listeners_.erase(it);
+        }
+        if (!yielded.empty()) listener = open(address, bound);
+      }
+      if (!listener) return fail(listener.error());
       opened.push_back(std::move(*listener));
     }
-  if (auto replaced = access_.replace(std::move(*access)); !replaced) return replaced;
+  if (auto replaced = access_.replace(std::move(*access)); !replaced) return fail(replaced.error());
 
   const auto before = std::exchange(config_, std::move(next));
   if (before.access.jwt != config_.access.jwt) issuer_keys_.start();
@@ -252,12 +278,14 @@ rr::Result<> Gateway::reconfigure(Config next) {
   }
   if (before.recordings != config_.recordings) recordings_->follow_config();
   router_ = make_routes(*this);
+  // Clients of a found device that is gone stay as long as it lets them.
+  const auto is_still_there = [this](const Device& device) { return device.config().is_found || devices_.has(device); };
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
-    // Clients of a found device that is gone stay as long as it lets them.
-    if (connection.device && !connection.device->config().is_found && !devices_.has(*connection.device))
+    if (connection.device && !is_still_there(*connection.device))
       connection.stop({1001, "the device has left the configuration, or is another one there"});
   }
+  clients_.close_all_but(is_still_there);
   end_those_not_good();
   return {};
 }

@@ -287,6 +287,7 @@ void SharedClient::handle(const rr::CallbackCompleted& completed) {
 }
 
 void SharedClient::answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result) {
+  if (is_closed()) return;  // its node may be gone, too
   const auto service = result ? owner_->find_service(login.attempt.service) : nullptr;
   if (service && (service->upstream()->is_resting() || !service->upstream()->has_tried())) {
     const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
@@ -330,6 +331,7 @@ void SharedClient::handle(const rr::LoginRequested& login) {
 
 rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient> self,
                                                    std::shared_ptr<SharedService> service, rr::LoginRequested login) {
+  if (self->is_closed()) co_return;
   auto& logins = self->owner_->logins();
   const DeviceLogin tried{login.attempt.username, service->device()->config().name, service->name(), self->from_};
   const auto ticket = logins.begin_at_device(tried);

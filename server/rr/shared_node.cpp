@@ -32,7 +32,7 @@ void SharedNode::close() {
   const auto clients = clients_;  // each removes itself
   for (const auto& [key, client] : clients) {
     client->close_service();
-    client->close(rr::make_error(rr::ErrorCode::connection_error, "the gateway stops"));
+    client->close(rr::make_error(rr::ErrorCode::connection_error, "the gateway stops, or shares the device no more"));
   }
 }
 

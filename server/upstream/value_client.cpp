@@ -446,6 +446,20 @@ void ValueClients::sweep() {
   if (!entries_.empty()) sweep_.arm(idle_time_ / 3);
 }
 
+void ValueClients::close_all_but(const std::function<bool(const Device&)>& is_still_there) {
+  std::vector<std::shared_ptr<Upstream>> gone;
+  std::erase_if(entries_, [&](const auto& item) {
+    const auto& [place, entry] = item;
+    const bool is_gone = entry.is_ours && !is_still_there(entry.upstream->device());
+    if (is_gone) gone.push_back(entry.upstream);
+    return is_gone;
+  });
+  for (const auto& upstream : gone) {
+    upstream->end_leases("the device has left the configuration, or is another one there");
+    upstream->close();
+  }
+}
+
 void ValueClients::stop() {
   is_stopped_ = true;
   sweep_.disarm();

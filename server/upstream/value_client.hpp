@@ -219,6 +219,8 @@ class ValueClients {
   rr::Result<std::shared_ptr<ValueClient>> make_another(std::shared_ptr<Upstream> upstream, Subject user);
   /// Whether the device has judged this login, and there is a session for it.
   bool has(const Device& device, const SessionKey& key) const;
+  /// Closes sessions with devices that are not what their names stand for any more, also those that are in use.
+  void close_all_but(const std::function<bool(const Device&)>& is_still_there);
   void stop();
 
  private:

@@ -140,6 +140,32 @@ def test_a_changed_configuration(device, tmp_path, way):
         stays.close()
 
 
+def test_streams_of_a_device_that_is_another_one_now_end(device, tmp_path):
+    with running(tmp_path, {"devices": [interop(device)]}) as gateway:
+        stream = Stream(gateway.port, BASE + "/state")
+        gateway.write({**gateway.config, "devices": [interop(f"rr+tcp://127.0.0.1:{free_port()}/?service=interop")]})
+        gateway.hang_up()
+        gateway.wait_for("configuration read anew")
+        with pytest.raises(EOFError):
+            while True:
+                stream.next()
+
+
+def test_listening_on_all_addresses_instead_of_one(device, tmp_path):
+    """And back, on the same port; where another address is taken, all stays as it was."""
+    with running(tmp_path, {"devices": [interop(device)], "insecure": True}) as gateway, socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        for count, host in enumerate(["0.0.0.0", "127.0.0.1"]):
+            address = f"{host}:{gateway.port}"
+            gateway.write({**gateway.config, "listen": [address, "127.0.0.1:%d" % taken.getsockname()[1]]})
+            gateway.wait_for("configuration not used; that from before stays", count + 1)
+            assert fetch(gateway.port, "/healthz")[0] == 200
+            gateway.write({**gateway.config, "listen": [address]})
+            gateway.wait_for("configuration read anew", count + 1)
+            assert fetch(gateway.port, "/healthz")[0] == 200
+
+
 def test_discovery_comes_and_goes(tmp_path):
     with running(tmp_path, {"devices": []}) as gateway:
         quiet = {"scopes": ["node_local"], "hardware": False}

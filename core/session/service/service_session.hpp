@@ -143,6 +143,10 @@ class ServiceSession {
   /// of packing.
   Result<CallbackId> call_callback(std::string_view path, const MemberDefinition& member,
                                    std::span<const Value> arguments, Now now);
+  /// Whether the client has asked for the object of that path, or of its service's root object.
+  bool uses(std::string_view path) const {
+    return service_ && (path == service_->name() || used_objects_.find(path) != used_objects_.end());
+  }
   /// Tells the client to look up `path` again, unless it still has to log in.
   void release_path(std::string_view path, Now now);
   /// Answers ObjectWanted: the service has the object now (HostedService::add_object()), or not.

@@ -238,8 +238,8 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   auto key = session_key(gateway, writer.request(), service);
   auto from = writer.request().origin();
   auto asked = device->shared_from_this();
-  const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
   const bool is_urgent = is_urgent_member(*device, segments);
+  const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;

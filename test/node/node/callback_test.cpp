@@ -14,7 +14,14 @@ namespace {
 constexpr const char* definition = R"(service test.bell
 stdver 0.10
 
+object Clapper
+    callback double ask(string question)
+    function void settle()
+end
+
 object Bell
+    objref Clapper left
+    objref Clapper right
     callback double ask(string question)
     callback void notice()
     function void ring()
@@ -24,12 +31,15 @@ end
 
 struct Bell {
   std::shared_ptr<Service> service = Service::from_text({definition}, "bell", "Bell");
+  std::shared_ptr<Object> clapper = service->make_object("Clapper");  ///< one object, known by two paths
   ClientId client = 0;
   std::vector<Result<Value>> answers;
   RunningNode node{[this](Node& made) {
     service->on_client_connected([this](ClientId id) { client = id; });
     service->function("ring", [this] { ask(service->current_client()); });
     service->function("settle", [] {});
+    for (const char* side : {"left", "right"}) service->objref(side, [this] { return clapper; });
+    clapper->function("settle", [] {});
     made.add(service);
   }};
 
@@ -69,6 +79,33 @@ TEST_CASE("a client answers with a value, with an error, by throwing, and where 
   const auto thrown = bell.ring(client).error();
   CHECK(thrown.qualified_name() == "rrgate.UnhandledException");
   CHECK(thrown.message == "asleep");
+}
+
+TEST_CASE("an object with several paths is called by one that the client uses") {
+  Bell bell;
+  const auto first = rr::connect(bell.node.url("bell"));
+  const auto left = first.object("left");
+  const auto second = rr::connect(bell.node.url("bell"));
+  const auto right = second.object("right");
+  right.on_callback("ask", [](const std::string&) { return 1.5; });
+  const auto ask = [&] {
+    bell.node.ask([&](Node&) {
+      bell.clapper->call_callback(bell.client, "ask", {"who is there?"},
+                                  [&](Result<Value> answer) { bell.answers.push_back(std::move(answer)); });
+      return 0;
+    });
+  };
+  ask();
+  right.call("settle");
+  right.call("settle");
+  REQUIRE(bell.answers_now().size() == 1);
+  CHECK(bell.answers_now().back().value() == Value(1.5));
+  const auto third = rr::connect(bell.node.url("bell"));  // uses no path of it
+  third.call("settle");
+  ask();
+  third.call("settle");
+  REQUIRE(bell.answers_now().size() == 2);
+  CHECK(bell.answers_now().back().error().code == ErrorCode::object_not_found);
 }
 
 TEST_CASE("calls to clients that are gone, or go, end with an error") {

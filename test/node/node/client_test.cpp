@@ -241,6 +241,71 @@ TEST_CASE("a wait ends in time though handlers that wait take longer than what t
   setter.join();
 }
 
+TEST_CASE("a handler of a service may set another one in its place") {
+  std::shared_ptr<Service> service;
+  std::vector<std::string> said;
+  // What a handler holds is there until it returns.
+  const auto tell = [&said](const std::weak_ptr<int>& held) { said.emplace_back(held.expired() ? "gone" : "there"); };
+  RunningNode node([&](Node& made) {
+    service = add_echo(made);
+    auto* root = service.get();
+    auto one = std::make_shared<int>(1);
+    root->function("say", [root, tell, weak = std::weak_ptr(one), one](std::string text) {
+      root->function("say", [](std::string) { return "another"; });
+      tell(weak);
+      return text;
+    });
+    auto two = std::make_shared<int>(2);
+    root->on_wire("count", [root, tell, weak = std::weak_ptr(two), two](std::int32_t) {
+      root->on_wire("count", [](std::int32_t) {});
+      tell(weak);
+    });
+    auto three = std::make_shared<int>(3);
+    root->pipe("words").on_connect([root, tell, weak = std::weak_ptr(three), three](const PipeEndpoint&) {
+      root->pipe("words").on_connect([](const PipeEndpoint&) {});
+      tell(weak);
+    });
+  });
+  const auto echo = connect(node.url("Echo"));
+  CHECK(echo.call("say", "x") == Value("x"));
+  CHECK(echo.call("say", "x") == Value("another"));
+  echo.connect_wire("count", [](const Value&, TimeSpec) {});
+  echo.send_wire("count", 3);
+  const auto words = echo.connect_pipe("words", [](const Value&) {});
+  echo.call("say", "x");
+  CHECK(node.ask([&](Node&) { return said; }) == std::vector<std::string>(3, "there"));
+}
+
+TEST_CASE("a client that ends calls no handlers") {
+  std::shared_ptr<Service> service;
+  RunningNode node([&](Node& made) { service = add_echo(made); });
+  int heard = 0;
+  {
+    const auto echo = connect(node.url("Echo"));
+    echo.on_event("said", [&](std::span<const Value>) { ++heard; });
+    echo.call("say", "one");
+    CHECK(heard == 1);
+    node.ask([&](Node&) { return service->fire("said", "two"), 0; });
+    std::this_thread::sleep_for(20ms);  // so that it is there, and not taken
+  }
+  CHECK(heard == 1);
+}
+
+TEST_CASE("a client that waits for no time takes what has come") {
+  std::shared_ptr<Service> service;
+  RunningNode node([&](Node& made) { service = add_echo(made); });
+  const auto echo = connect(node.url("Echo"));
+  int heard = 0;
+  echo.on_event("said", [&](std::span<const Value>) { ++heard; });
+  echo.call("say", "one");
+  node.ask([&](Node&) { return service->fire("said", "two"), 0; });
+  for (int i = 0; heard < 2 && i < 200; ++i) {
+    std::this_thread::sleep_for(10ms);
+    echo.connection().run_for(0ms);
+  }
+  CHECK(heard == 2);
+}
+
 TEST_CASE("a session that ends with its beginning is known as closed") {
   RunningNode node([](Node& made) { add_echo(made)->on_client_connected([&made](ClientId) { made.stop(); }); });
   const auto echo = connect(node.url("Echo"));

@@ -4,12 +4,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include "core/support/random.hpp"
+#include "node/platform/file_look.hpp"
 #include "node/platform/folders.hpp"
+#include "node/platform/locked_file.hpp"
 #include "node/platform/node_id_store.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/node/transport/sandbox.hpp"
@@ -117,6 +121,40 @@ TEST_CASE("info files are read as the reference writes them") {
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: relative.sock\n").has_value());
   CHECK_FALSE(parse_local_info("nodeid: nonsense\nsocket: /a.sock\n").has_value());
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: /a\0b.sock\n"sv).has_value());
+}
+
+TEST_CASE("a lock is of the file that the path names, whoever removes it meanwhile") {
+  const Sandbox sandbox;
+  const auto path = fs::path(sandbox.folder()) / "robot.pid";
+  fs::create_directories(path.parent_path());
+  std::atomic<bool> is_over = false;
+  std::thread other([&] {
+    while (!is_over)
+      if (auto left = LockedFile::open_left_behind(path)) left->remove();
+  });
+  int taken = 0;
+  int lost = 0;
+  for (int i = 0; i < 100'000 && taken < 2000; ++i) {
+    const auto mine = LockedFile::open(path);
+    if (!mine) continue;
+    ++taken;
+    if (!LockedFile::is_held(path)) ++lost;
+  }
+  is_over = true;
+  other.join();
+  CHECK(taken > 100);
+  CHECK(lost == 0);
+}
+
+TEST_CASE("a file that is given to somebody else looks different") {
+  const Sandbox sandbox;
+  const auto path = sandbox.folder() + "/file";
+  write_file(path, "text");
+  const auto before = file_look(path);
+  CHECK(file_look(path) == before);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // a tick of the file system's clock
+  fs::permissions(path, fs::perms::owner_read);
+  CHECK(file_look(path) != before);
 }
 
 TEST_CASE("a name keeps its NodeID, for one node at a time") {

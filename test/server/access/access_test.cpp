@@ -448,6 +448,33 @@ TEST_CASE("who was let in stays so by what he has shown, as long as that is good
   CHECK(stranger.is_good());
 }
 
+TEST_CASE("what was revoked between showing and using is not good") {
+  Files files;
+  files.write("users", Files::user("otto", "one", "operator") + Files::user("alice", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  const auto shown = access.logged_in(log_in(access, "otto", "one").value(), "here:1");
+  files.write("users", Files::user("alice", "one", "viewer"));
+  access.reload(false);
+  Standing otto(access, shown);
+  CHECK_FALSE(otto.is_good());
+  CHECK_FALSE(otto.check(a_write));
+}
+
+TEST_CASE("users that a new configuration finds changed are recorded, too") {
+  Files files;
+  const auto alice = Files::user("alice", "one", "viewer");
+  files.write("users", Files::user("otto", "one", "operator") + alice);
+  const auto config = with_users(files);
+  Access access(config);
+  REQUIRE(access.load());
+  files.write("users", alice);
+  REQUIRE(access.replace(load_access(config).value()));
+  const auto lines = files.audit(access);
+  REQUIRE(lines.size() == 1);
+  CHECK(lines.front()["event"] == "user_removed");
+}
+
 TEST_CASE("of a stream of packets the first is recorded") {
   Files files;
   files.write("users", Files::user("otto", "one", "operator"));
