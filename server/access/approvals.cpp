@@ -76,9 +76,9 @@ rr::Result<Approval> Approvals::answer(const std::string& id, const Identity& by
   return out;
 }
 
-std::size_t Approvals::stop(Time until) {
+std::size_t Approvals::stop(std::chrono::minutes time, Time now) {
   std::size_t count = 0;
-  stopped_until_ = until;
+  stopped_until_ = time == time.zero() ? now : std::max(now + time, stopped_until_);
   grants_.clear();
   for (const auto& each : asked_)
     if (const auto asked = each.lock()) {  // also what was allowed just now, and is not begun

@@ -35,14 +35,15 @@ struct WantedCommand {
 struct Approval {
   std::string id = {};
   WantedCommand command = {};
-  std::chrono::system_clock::time_point ends = {};  ///< nobody can allow it any more
+  std::chrono::steady_clock::time_point ends = {};  ///< nobody can allow it any more
 };
 
 /// Few at a time, and each for a short time: nobody who answers is a refusal. Also what a person stops agents by. For
 /// the gateway's thread.
 class Approvals {
  public:
-  using Time = std::chrono::system_clock::time_point;
+  using Clock = std::chrono::steady_clock;  ///< one that nobody sets: a step would end a stop, or prolong a grant
+  using Time = Clock::time_point;
   using Wake = std::function<void()>;
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_of_subject = 4;
@@ -79,9 +80,10 @@ class Approvals {
   rr::Result<Approval> answer(const std::string& id, const Identity& by, bool is_allowed, std::chrono::minutes grant,
                               Time now);
 
-  /// Agents command nothing until then: what waits is denied, what is allowed for some time is not any more, and what
-  /// goes on is told. Returns how many commands that were.
-  std::size_t stop(Time until);
+  /// Agents command nothing for so long, and as long as an earlier stop says; 0: they go on at once. What waits is
+  /// denied, what is allowed for some time is not any more, and what goes on is told. Returns how many commands that
+  /// were.
+  std::size_t stop(std::chrono::minutes time, Time now);
   bool is_stopped(Time now) const { return now < stopped_until_; }
   Time stopped_until() const { return stopped_until_; }
   /// Calls `wake` at stop(), as long as what is returned is kept.

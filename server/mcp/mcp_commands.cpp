@@ -25,10 +25,6 @@ constexpr milliseconds longest_sign{500};
 /// The gateway holds the lease for the agent as long as its request is there; both parts of it take less.
 constexpr milliseconds agent_deadman{60'000};
 
-std::chrono::system_clock::time_point wall_now() {
-  return std::chrono::system_clock::now();
-}
-
 rr::LockWanted wanted_lease(rr::LockCommand command, const std::string& path) {
   rr::LockWanted out;
   out.command = command;
@@ -170,7 +166,7 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
                     why};
   auto terms = judge(command);
   auto& approvals = gateway_.approvals();
-  const bool is_approved = !terms.needs_approval || approvals.is_granted(command.wanted, wall_now());
+  const bool is_approved = !terms.needs_approval || approvals.is_granted(command.wanted, Approvals::Clock::now());
   if (is_dry) {
     auto out = rr::OrderedJson::object();
     rr::add_key(out, "member") = name_of(target);
@@ -187,7 +183,7 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
 }
 
 AgentTerms McpTools::judge(const Command& command) {
-  if (gateway_.approvals().is_stopped(wall_now()))
+  if (gateway_.approvals().is_stopped(Approvals::Clock::now()))
     refuse(rr::ErrorCode::permission_denied,
            "a person has stopped all agents; nothing is commanded until that is over");
   const auto what = command.wanted.what();
@@ -216,7 +212,7 @@ rr::awaitable<void> McpTools::ask_person(const Command& command) {
     gateway_.access().record({.event = event, .who = &who(), .what = &what, .detail = detail, .outcome = outcome});
   };
   const auto longest = gateway_.config().mcp.longest_approval;
-  const auto now = wall_now();
+  const auto now = Approvals::Clock::now();
   const auto asked = value_or_throw(gateway_.approvals().ask(command.wanted, reply_.waker(), now + longest, now));
   record("approval_asked", command.wanted.why);
   const std::function<bool()> is_answered = [&] {

@@ -12,11 +12,10 @@ namespace rrgate {
 
 namespace {
 
-using Clock = std::chrono::system_clock;
 using std::chrono::minutes;
 
-std::int64_t seconds_until(Clock::time_point end) {
-  return std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::seconds>(end - Clock::now()).count());
+std::int64_t seconds_until(Approvals::Time end) {
+  return std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::seconds>(end - Approvals::Clock::now()).count());
 }
 
 double seconds_from(std::chrono::steady_clock::time_point begin, std::chrono::steady_clock::time_point now) {
@@ -92,7 +91,7 @@ Response answer_approval(GatewayState& gateway, const Request& request, const st
   if (is_for_some_time && !body->contains("minutes")) return error_answer(bad_request("minutes are missing"));
   const bool is_allowed = *answer != "deny";
   const auto answered = gateway.approvals().answer(id, request.identity, is_allowed,
-                                                   is_for_some_time ? *grant : minutes(0), Clock::now());
+                                                   is_for_some_time ? *grant : minutes(0), Approvals::Clock::now());
   if (!answered) return error_answer(answered.error());
   const auto what = answered->command.what();
   const auto detail = "for " + answered->command.who.name +
@@ -110,7 +109,7 @@ Handler approvals_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (auto refusal = refuse_who_may_not_admin(gateway, request)) return std::move(*refusal);
     auto list = rr::OrderedJson::array();
-    for (const auto& each : gateway.approvals().list(Clock::now())) list.push_back(described(each));
+    for (const auto& each : gateway.approvals().list(Approvals::Clock::now())) list.push_back(described(each));
     auto out = rr::OrderedJson::object();
     rr::add_key(out, "approvals") = std::move(list);
     rr::add_key(out, "stopped_for") = seconds_until(gateway.approvals().stopped_until());
@@ -148,9 +147,11 @@ Handler stop_agents_endpoint(GatewayState& gateway) {
     if (!body) return error_answer(body.error());
     const auto time = minutes_of(*body, 0, Approvals::longest_stop, minutes(10));
     if (!time) return error_answer(time.error());
-    const auto ended = gateway.approvals().stop(Clock::now() + *time);
-    log(LogLevel::warning, "agents stopped", {{"user", request.identity.name}, {"minutes", time->count()}});
-    const auto detail = std::to_string(ended) + " commands ended, for " + std::to_string(time->count()) + " minutes";
+    const auto now = Approvals::Clock::now();
+    const auto ended = gateway.approvals().stop(*time, now);
+    const auto left = std::chrono::ceil<minutes>(gateway.approvals().stopped_until() - now).count();
+    log(LogLevel::warning, "agents stopped", {{"user", request.identity.name}, {"minutes", left}});
+    const auto detail = std::to_string(ended) + " commands ended, for " + std::to_string(left) + " minutes";
     gateway.access().record({.event = "agents_stopped", .who = &request.identity, .detail = detail});
     return json_answer(200, {{"ended", ended}, {"stopped_for", seconds_until(gateway.approvals().stopped_until())}});
   };

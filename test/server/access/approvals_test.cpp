@@ -141,7 +141,7 @@ TEST_CASE("approvals: stop denies what waits and what was allowed but not begun,
   const auto running = approvals.watch_stop([&] { ++told; });
   approvals.watch_stop([&] { told += 100; });  // is over at once
   CHECK_FALSE(approvals.is_stopped(start));
-  CHECK(approvals.stop(start + minutes(10)) == 2);
+  CHECK(approvals.stop(minutes(10), start) == 2);
   CHECK(woken == 1);
   CHECK(told == 1);
   CHECK(waiting->state() == ApprovalState::denied);
@@ -149,4 +149,18 @@ TEST_CASE("approvals: stop denies what waits and what was allowed but not begun,
   CHECK_FALSE(approvals.is_granted(drive(), start));
   CHECK(approvals.is_stopped(start + minutes(10) - seconds(1)));
   CHECK_FALSE(approvals.is_stopped(start + minutes(10)));
+}
+
+TEST_CASE("approvals: a second stop shortens no longer one, but lets agents go on at once where it says so") {
+  Approvals approvals;
+  approvals.stop(minutes(480), start);
+  approvals.stop(minutes(10), start + minutes(1));
+  CHECK(approvals.stopped_until() == start + minutes(480));
+  approvals.stop(minutes(10), start + minutes(475));
+  CHECK(approvals.stopped_until() == start + minutes(485));
+  approvals.stop(minutes(0), start + minutes(476));
+  CHECK_FALSE(approvals.is_stopped(start + minutes(476)));
+  approvals.stop(minutes(10), start + minutes(477));
+  CHECK(approvals.stopped_until() == start + minutes(487));
+  STATIC_REQUIRE(Approvals::Clock::is_steady);
 }
