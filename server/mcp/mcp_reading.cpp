@@ -125,6 +125,11 @@ McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr targe
       expect_member(*target, "read", {rr::MemberKind::property, rr::MemberKind::wire, rr::MemberKind::memory});
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "member") = name_of(*target);
+  if (target->is_shape) {  // all that who may write it alone may read of a memory
+    const auto shape = co_await memory_shape(*target);
+    rr::add_key(out, from_device) = rr::OrderedJson(shape);
+    co_return out;
+  }
   if (member.kind == rr::MemberKind::memory) {
     const rr::JsonForm form;
     auto items = co_await read_memory(arguments, target, form);
