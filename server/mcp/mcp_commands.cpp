@@ -2,6 +2,7 @@
 // docs/mcp.md.
 #include <chrono>
 
+#include "core/types/value_size.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/leases.hpp"
@@ -268,6 +269,7 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "member") = name_of(target);
   rr::add_key(out, "sent") = command.values;
+  rr::Value said;
   if (target.member->is_generator()) {
     const auto results = co_await run_generator(command, client, check, entry);
     out.update(results);
@@ -281,17 +283,26 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
       has_asked_device_ = true;
       throw rr::Exception(answered.error());
     }
-    if (command.wanted.verb == Verb::call) co_await add_value(out, target, *answered);
+    said = std::move(*answered);
   }
-  if (!lease) co_return out;
-  lease->renew();
-  const std::function<bool()> is_over = [&] {
-    check();
-    return false;
-  };
-  reply_.note("the lease is held");
-  co_await reply_.wait(terms.hold, is_over);
-  rr::add_key(out, "made_safe") = "the lease was held for " + std::to_string(terms.hold.count()) + " s";
+  if (lease) {
+    lease->renew();
+    const std::function<bool()> is_over = [&] {
+      check();
+      return false;
+    };
+    reply_.note("the lease is held");
+    co_await reply_.wait(terms.hold, is_over);
+    lease.reset();
+    rr::add_key(out, "made_safe") = "the lease was held for " + std::to_string(terms.hold.count()) + " s";
+  }
+  if (target.member->is_generator() || command.wanted.verb != Verb::call) co_return out;
+  // The device has done it: that there is no room for what it says of that is no failure, nor a reason to let go.
+  try {
+    co_await add_value(out, target, said);
+  } catch (const rr::Exception& exception) {
+    rr::add_key(out, result_left_out) = bounded_text(exception.error().message);
+  }
   co_return out;
 }
 
@@ -333,7 +344,8 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
   auto results = rr::OrderedJson::array();
   std::size_t bytes = 0;
   bool has_ended = false;
-  while (!failed && results.size() < command.most && bytes < largest_results) {
+  std::string left_out;  // why the next result is not there, and no other is asked for
+  while (!failed && left_out.empty() && results.size() < command.most && bytes < largest_results) {
     auto step = target.request(rr::CallKind::generator_next);
     step.generator = generator->id();
     const auto rest = std::chrono::duration_cast<milliseconds>(until - std::chrono::steady_clock::now());
@@ -342,11 +354,20 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
     if (has_ended) break;
     if (!next) {
       failed = next.error();
-    } else {
+      break;
+    }
+    if (bytes + rr::held_bytes(*next) > largest_results) {
+      left_out =
+          "the results have more than " + std::to_string(largest_results) + " bytes, all that an answer has room for";
+      break;
+    }
+    try {
       results.push_back(to_json(target, *next, {}));
       bytes += held_bytes(results.back());
-      reply_.note(std::to_string(results.size()) + " results so far");
+    } catch (const rr::Exception& exception) {
+      left_out = bounded_text(exception.error().message);
     }
+    reply_.note(std::to_string(results.size()) + " results so far");
   }
   if (entry) entry->finish(failed ? rr::Result<>(*failed) : rr::Result<>());
   if (!failed) generator->close_at_end();
@@ -357,6 +378,7 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "has_ended") = has_ended;
   rr::add_key(out, from_device) = std::move(results);
+  if (!left_out.empty()) rr::add_key(out, result_left_out) = left_out;
   co_return out;
 }
 

@@ -150,7 +150,11 @@ JsonRequestPtr request_of(const ResourceName& resource);
 /// By the gateway's clock; of any time that a device may say.
 std::int64_t age_ms(const rr::TimeSpec& time, std::chrono::system_clock::time_point now);
 
-/// {"content": ..., "structuredContent": ...}. `image`  beside the result; null: there is none.
+/// Why an answer to a command that the device has carried out, which stands under "sent", has not all of its result.
+inline constexpr std::string_view result_left_out = "result_left_out";
+
+/// {"content": ..., "structuredContent": ...}. A result that is too long is an error, but of a command that was sent.
+/// `image`  beside the result; null: there is none.
 rr::OrderedJson tool_result(rr::OrderedJson result, bool is_error, const McpImage* image = nullptr);
 
 }  // namespace rrgate

@@ -143,3 +143,36 @@ TEST_CASE("agents: a right to write a memory tells how large it is, and nothing 
   CHECK(rr::Json::parse(resource["result"]["contents"][0]["text"].get<std::string>())["from_device"] ==
         rr::Json::parse("[2]"));
 }
+
+TEST_CASE("agents: what a device has done is told as done, under its lease, however long the answer is") {
+  const AgentsRobot robot;
+  REQUIRE(robot.is_online());
+  const auto is_done = [](const rr::Json& result, const rr::Json& sent) {
+    const auto& told = result["structuredContent"];
+    INFO(told.dump().substr(0, 500));
+    CHECK(result["isError"] == false);
+    CHECK(told["member"].is_string());
+    CHECK(told.value("sent", rr::Json()) == sent);
+    CHECK(told.contains("made_safe"));
+    CHECK_FALSE(told.contains("error"));
+    return told;
+  };
+  CHECK(is_done(robot.call("say", {{"count", 3}}), {{"count", 3}})["from_device"] == "xxx");
+  for (const auto count : {300'000, 2'000'000}) {  // too long for an answer; for the gateway to look at
+    const auto told = is_done(robot.call("say", {{"count", count}}), {{"count", count}});
+    CHECK_FALSE(told.contains("from_device"));
+    CHECK(told.value("result_left_out", "").find("bytes") != std::string::npos);
+  }
+  const auto none = rr::OrderedJson::object();
+  CHECK(is_done(robot.call("look", none), rr::Json::object()).value("result_left_out", "") != "");
+
+  const auto some = is_done(robot.call("talk", {{"count", 3}}, {{"most", 2}}), {{"count", 3}});
+  CHECK(some["from_device"] == rr::Json::parse(R"(["xxx", "xxx"])"));
+  CHECK_FALSE(some.contains("result_left_out"));
+  const auto large = is_done(robot.call("talk", {{"count", 2'000'000}}), {{"count", 2'000'000}});
+  CHECK(large["from_device"] == rr::Json::array());
+  CHECK(large.value("result_left_out", "").find("1048576 bytes") != std::string::npos);
+  const auto many = is_done(robot.call("talk", {{"count", 200'000}}, {{"most", 3}}), {{"count", 200'000}});
+  CHECK_FALSE(many.contains("from_device"));
+  CHECK(many.value("result_left_out", "").find("262144 bytes") != std::string::npos);
+}
