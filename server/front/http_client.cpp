@@ -305,7 +305,7 @@ bool makes_work(const Request& request) {
   return is_guarded(request) && request.path() != "/metrics";
 }
 
-/// Who goes through with a request though it be too much; empty: nobody.
+/// Who goes through with a request though it be too much, or there be no memory left; empty: nobody.
 std::function<bool(const Identity&)> who_passes(GatewayState& gateway, const Request& request) {
   // The rules are asked when it is known who comes: they may have been read anew by then.
   if (may_stop_something(request))
@@ -359,14 +359,16 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
   request.identity.face = face_of(request);
   HttpAccess::Admitted admitted;
+  const auto passes = who_passes(gateway, request);
   admitted.refusal = refuse_page(gateway, request);
   if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
   if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
-    admitted = co_await gateway.http_access().admit(request, connection, config, who_passes(gateway, request));
+    admitted = co_await gateway.http_access().admit(request, connection, config, passes);
     if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
   }
   auto memory = gateway.memory().charge(network_name(request.arrival.address));
-  if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
+  const bool is_urgent = passes && passes(request.identity);
+  if (!admitted.refusal && !is_refused && makes_work(request) && !is_urgent && !memory.has_room(least_room))
     admitted.refusal = no_memory_response();
   if (admitted.refusal && asks_for_websocket(request)) {
     co_await write_refusal(gateway, *stream, *admitted.refusal);
@@ -382,8 +384,12 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
     headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
   if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));
-  ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
-                          &gateway.metrics()};
+  ResponseOptions options{.closes = gateway.is_stopping(),
+                          .headers = std::move(headers),
+                          .patience = config.timeouts.send_stall,
+                          .is_vital = !makes_work(request),
+                          .is_urgent = is_urgent,
+                          .metrics = &gateway.metrics()};
   ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
   const auto response = admitted.refusal                ? *admitted.refusal
                         : is_refused                    ? stopping_response()

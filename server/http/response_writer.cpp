@@ -56,7 +56,11 @@ rr::awaitable<rr::error_code> ResponseWriter::write_slices(std::span<const rr::B
 }
 
 rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t limit) {
-  const RequestReader::HasRoom has_room = [this](std::size_t bytes) { return memory_.resize(bytes); };
+  const RequestReader::HasRoom has_room = [this](std::size_t bytes) {
+    if (!is_urgent(bytes)) return memory_.resize(bytes);
+    memory_.hold(bytes);
+    return true;
+  };
   body_failure_ = co_await reader_.read_body(request_, has_room, limit);
   is_whole_ = std::chrono::steady_clock::now();
   if (!body_failure_) co_return std::nullopt;

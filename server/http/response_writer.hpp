@@ -21,6 +21,7 @@ struct ResponseOptions {
   /// For each part of a response, beside what least_rate gives for its bytes. Who reads slower is cut.
   std::chrono::milliseconds patience{15'000};
   bool is_vital = false;       ///< answered also when there is no memory left
+  bool is_urgent = false;      ///< it may stop something: no memory left is no reason against largest_urgent bytes
   Metrics* metrics = nullptr;  ///< where responses are counted; null: nowhere
 };
 
@@ -39,6 +40,7 @@ class ResponseWriter {
         memory_(std::move(memory)),
         closes_(options.closes),
         is_vital_(options.is_vital),
+        is_urgent_(options.is_urgent),
         metrics_(options.metrics),
         headers_(std::move(options.headers)),
         patience_(options.patience),
@@ -47,6 +49,8 @@ class ResponseWriter {
   /// Reads the body into request(), where there is one: when it is clear that the client may do what it asks for.
   /// Returns what to answer instead; nullopt: it is there. Without this the connection ends behind the response.
   rr::awaitable<std::optional<Response>> read_body(std::size_t limit = std::size_t(-1));
+  /// Whether so many bytes of its body are taken in any case; see ResponseOptions.
+  bool is_urgent(std::size_t bytes) const { return is_urgent_ && bytes <= largest_urgent; }
   /// Why the body could not be read, if so.
   const std::optional<ReadFailure>& body_failure() const { return body_failure_; }
 
@@ -108,6 +112,7 @@ class ResponseWriter {
   std::optional<ReadFailure> body_failure_;
   bool closes_;
   bool is_vital_;
+  bool is_urgent_;
   Metrics* metrics_;
   std::chrono::steady_clock::time_point is_whole_ = std::chrono::steady_clock::now();  ///< the request
   std::vector<std::pair<std::string, std::string>> headers_;

@@ -63,4 +63,7 @@ class MemoryBudget {
 /// Who asks for something new should have room for so much: else it is refused.
 inline constexpr std::size_t least_room = 64 * 1024;
 
+/// What stops something is taken though there be no room, where it has no more bytes than this.
+inline constexpr std::size_t largest_urgent = 4 * 1024;
+
 }  // namespace rrgate

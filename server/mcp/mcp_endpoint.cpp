@@ -18,9 +18,6 @@ namespace {
 /// Of a message; values that are larger go by REST.
 constexpr std::size_t largest_message = large_json_bytes;
 
-/// Of a message that stops something, if too much was asked for. Others cost no more than this.
-constexpr std::size_t largest_stop = 4 * 1024;
-
 /// Of what an agent says, for people who look at a list of it.
 constexpr std::size_t longest_shown = 200;
 
@@ -350,17 +347,30 @@ rr::awaitable<void> answer_stream(GatewayState& gateway, ResponseWriter& writer)
   co_await reply.end();
 }
 
-/// Refuses what is too much and does not stop anything.
-std::optional<Response> refuse_too_much(GatewayState& gateway, const Request& request) {
-  if (request.too_much.empty()) return std::nullopt;
-  const auto json = rr::read_json(request.message.body());
+/// Whether a message stops something, and is small enough to be taken in any case.
+bool stops_something(const std::string& body) {
+  if (body.size() > largest_urgent) return false;
+  const auto json = rr::read_json(body);
   const auto is = [](const rr::Json& of, const char* key, std::string_view text) {
     const auto found = of.is_object() ? of.find(key) : of.end();
     return found != of.end() && *found == text;
   };
-  if (json && is(*json, "method", "notifications/cancelled")) return std::nullopt;
-  if (json && is(*json, "method", "tools/call") && json->contains("params") && is((*json)["params"], "name", "stop"))
+  if (!json) return false;
+  if (is(*json, "method", "notifications/cancelled")) return true;
+  return is(*json, "method", "tools/call") && json->contains("params") && is((*json)["params"], "name", "stop");
+}
+
+/// Refuses what is too much, or has no room, and does not stop anything. `room`  for what the message becomes.
+std::optional<Response> refuse_too_much(GatewayState& gateway, const Request& request, MemoryBudget::Charge& room) {
+  const auto& body = request.message.body();
+  const auto needed = rr::memory_of_json(body);
+  const bool has_room = room.has_room(least_room) && room.resize(needed);
+  if (has_room && request.too_much.empty()) return std::nullopt;
+  if (stops_something(body)) {
+    room.hold(needed);
     return std::nullopt;
+  }
+  if (!has_room) return no_memory_response();
   gateway.reject(Rejection::rate);
   return gateway.http_access().refuse_too_much(request.identity, nullptr, request.too_much);
 }
@@ -368,10 +378,9 @@ std::optional<Response> refuse_too_much(GatewayState& gateway, const Request& re
 rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
   const auto& request = writer.request();
   auto refused = refuse_agent(gateway, request);
-  if (!refused) refused = co_await writer.read_body(request.too_much.empty() ? largest_message : largest_stop);
-  if (!refused) refused = refuse_too_much(gateway, request);
+  if (!refused) refused = co_await writer.read_body(request.too_much.empty() ? largest_message : largest_urgent);
   auto room = writer.memory().sibling();
-  if (!refused && !room.resize(rr::memory_of_json(request.message.body()))) refused = no_memory_response();
+  if (!refused) refused = refuse_too_much(gateway, request, room);
   if (refused) {
     co_await writer.send(*refused);
     co_return;

@@ -17,7 +17,7 @@ Handler mcp_endpoint(GatewayState& gateway);
 /// The client's session is over: what it still waits for is cancelled.
 Handler end_mcp_endpoint(GatewayState& gateway);
 /// Whether a request may stop something: by the tool "stop", or because a session or a request of it ends. Of a message
-/// its body tells, and mcp_endpoint() refuses all others that are too much (Request::too_much).
+/// its body tells, and mcp_endpoint() refuses all others that are too much (Request::too_much), or have no room.
 bool may_stop_something(const Request& request);
 
 /// Which issuer's tokens clients show at mcp_path, where one is configured. Source: RFC 9728.

@@ -90,20 +90,24 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const bool is_large = message.size() > large_json_bytes;
   const auto measure = [&message] { return rr::memory_of_json(message); };
   auto memory = gateway_.memory().charge(place_.from.network);
+  const bool is_small = message.size() <= largest_urgent;  // it may stop something
   bool has_room = memory.has_room(least_room);
-  if (has_room) {
+  if (has_room || is_small) {
     // Named: g++ 12 destroys twice what a co_await within ?: gives.
     std::size_t needed = 0;
     if (is_large)
       needed = co_await gateway_.workers().run(measure);
     else
       needed = measure();
-    has_room = memory.resize(needed);
+    has_room = has_room && memory.resize(needed);
+    if (is_small) memory.hold(needed);
   }
-  if (!has_room)
-    co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
-                                                "the gateway has no memory left for a message of " +
-                                                    std::to_string(message.size()) + " bytes; try again in a moment"));
+  const auto tell_no_room = [&](const std::string& id) {
+    tell_error(id, rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                  "the gateway has no memory left for a message of " + std::to_string(message.size()) +
+                                      " bytes; try again in a moment"));
+  };
+  if (!has_room && !is_small) co_return tell_no_room("null");
   const auto parse = [&message] { return JsonRequest::from_text(message); };
   rr::Result<JsonRequest> read = rr::Error();
   if (is_large)
@@ -115,6 +119,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   const bool passes = operation && (operation->traits.gives_back || is_urgent(*request, *operation));
+  if (!has_room && !passes) co_return tell_no_room(request->id());
   if (operation && operation->traits.keeps_order && !passes) {
     co_await queue(request, std::move(memory));
     co_return;

@@ -146,7 +146,7 @@ def test_at_its_end_what_is_new_is_refused_and_what_runs_goes_on(gateway, node):
         assert refused.headers["Retry-After"] == "2"
         assert is_refused(RR.ServiceException, lambda: root.add(1, 2))
         page.socket.send(json.dumps({"id": 1, "op": "get", "path": "version"}))
-        assert "no memory left" in page.next(id=None)["error"]["message"]
+        assert "no memory left" in page.next(id=1)["error"]["message"]
         assert ask(gateway.port, "GET", "/healthz").status == 200
         for stranger in strangers:
             stranger.close()

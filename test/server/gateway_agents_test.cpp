@@ -176,3 +176,58 @@ TEST_CASE("agents: what a device has done is told as done, under its lease, howe
   CHECK_FALSE(many.contains("from_device"));
   CHECK(many.value("result_left_out", "").find("262144 bytes") != std::string::npos);
 }
+
+TEST_CASE("what stops something is taken where an address has used up its memory") {
+  const AgentsRobot robot;
+  REQUIRE(robot.is_online());
+  const std::string service = "/api/v1/devices/robot/Robot";
+  const auto lease =
+      rr::Json::parse(robot.ask("POST " + service + "?lease=acquire&deadman=60000", robot.person).body)["lease"]
+          .get<std::string>();
+  TestClient socket(robot.gateway.port());
+  REQUIRE(
+      socket
+          .upgrade(service, "Sec-WebSocket-Protocol: rrgate.json.v1\r\nAuthorization: Bearer " + robot.person + "\r\n")
+          .status == 101);
+  const auto say = [&](const rr::OrderedJson& json) {
+    socket.send_frame(1, rr::as_bytes(rr::write_json(json)));
+    return rr::Json::parse(rr::as_text(socket.receive_frame().payload));
+  };
+  CHECK(say({{"id", 1}, {"op", "get"}, {"path", "speed"}})["result"] == 0.0);
+
+  TestClient hog(robot.gateway.port());  // half of the account, but for a thousand bytes
+  hog.send("PUT " + service + "/speed HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + robot.person +
+           "\r\nContent-Type: application/json\r\nContent-Length: 499000\r\nRrgate-Lease: " + lease + "\r\n\r\n ");
+  REQUIRE(comes_to([&] { return robot.ask("GET /api/v1/devices", robot.person).status == 503; }));
+
+  const std::string spaces(2000, ' ');
+  std::string numbers = "0";
+  for (int i = 0; i < 200; ++i) numbers += ",0";
+  const auto halt = R"({"how": [)" + numbers + "]}";
+  CHECK(robot.ask("PUT " + service + "/speed", robot.person, "1").status == 503);
+  CHECK(robot.ask("POST " + service + "/halt", robot.person, halt).status == 200);
+  CHECK(robot.ask("POST " + service + "/halt", robot.person, halt + spaces).status == 200);
+  CHECK(robot.ask("POST " + service + "/halt", robot.person, halt + spaces + spaces).status == 503);
+  CHECK(robot.ask("POST " + service + "/halt", robot.agent, halt).status == 503);  // it may not
+  CHECK(robot.ask("POST /api/v1/agents/stop", robot.person, spaces + R"({"minutes": 0})").status == 200);
+  CHECK(robot.ask("POST /api/v1/agents/stop", robot.agent, R"({"minutes": 0})").status == 503);
+
+  CHECK(robot.ask("POST /mcp", robot.agent, AgentsRobot::use("devices", "")).status == 503);
+  const auto stop = robot.ask("POST /mcp", robot.agent, AgentsRobot::use("stop", "Robot") + spaces);
+  CHECK(stop.status == 200);
+  CHECK(rr::Json::parse(stop.body)["result"]["isError"] == false);
+  CHECK(robot.ask("POST /mcp", robot.agent, AgentsRobot::use("stop", "Robot") + spaces + spaces).status == 503);
+  const auto cancel = R"({"jsonrpc": "2.0", "method": "notifications/cancelled", "params": {"requestId": 1}})";
+  CHECK(robot.ask("POST /mcp", robot.agent, cancel).status == 202);
+  CHECK(robot.ask("DELETE /mcp", robot.agent, {}, "Mcp-Session-Id: none\r\n").status == 204);
+
+  const auto refused = say({{"id", 2}, {"op", "get"}, {"path", "speed"}});
+  CHECK(refused["id"] == 2);
+  CHECK(refused["error"]["message"].get<std::string>().find("no memory left") != std::string::npos);
+  const auto args = rr::OrderedJson::parse(halt);
+  CHECK(say({{"id", 3}, {"op", "call"}, {"path", "halt"}, {"args", args}}).value("error", rr::Json()) == nullptr);
+
+  CHECK(robot.ask("POST " + service + "?lease=release", robot.person, {}, "Rrgate-Lease: another\r\n").status == 503);
+  CHECK(robot.ask("POST " + service + "?lease=release", robot.person, {}, "Rrgate-Lease: " + lease + "\r\n").status ==
+        204);
+}

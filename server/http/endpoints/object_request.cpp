@@ -164,7 +164,9 @@ rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
     needed = co_await gateway_.workers().run(measure);
   else
     needed = measure();
-  if (!room.resize(needed))
+  if (writer_.is_urgent(text.size()))
+    room.hold(needed);
+  else if (!room.resize(needed))
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
                              "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
                                  " bytes becomes; try again in a moment");

@@ -15,8 +15,9 @@ namespace rrgate {
 inline constexpr std::array<std::string_view, 5> device_resources = {"subscriptions", "openapi.json", "asyncapi.json",
                                                                      "thing-description.json", "types.d.ts"};
 
-/// A request that no rate holds up, as long as somebody may `verb` the service: it commands a member of a device that
-/// is urgent (LeaseConfig::is_urgent()), gives back a lease whose key it shows, or stops all agents.
+/// A request that neither a rate nor a lack of memory holds up, as long as somebody may `verb` the service: it commands
+/// a member of a device that is urgent (LeaseConfig::is_urgent()), gives back a lease whose key it shows, or stops all
+/// agents.
 struct UrgentCommand {
   std::string device = {};
   std::string service = {};
