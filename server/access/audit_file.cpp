@@ -134,8 +134,11 @@ void AuditFile::find_chain() {
 
 rr::Result<> AuditFile::rotate() {
   const auto name = [this](std::size_t number) { return config_.file + "." + std::to_string(number); };
+  // Where it has been renamed, by this before it could not be opened anew or by somebody else, there is nothing left to
+  // do: each further shift would cost the oldest file.
+  struct stat about {};
+  if (::lstat(config_.file.c_str(), &about) != 0) return reopen();
   for (auto number = config_.keep; number > 1; --number) ::rename(name(number - 1).c_str(), name(number).c_str());
-  // Where somebody else has renamed it, there is nothing left to do.
   if (::rename(config_.file.c_str(), name(1).c_str()) != 0 && errno != ENOENT)
     return rr::make_error(rr::ErrorCode::io_error,
                           "audit file " + rr::quote(config_.file, 200) + " can't be renamed: " + system_text());

@@ -1,11 +1,14 @@
 #include "server/access/audit_log.hpp"
 
+#include <sys/resource.h>
+
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "server/access/audit_file.hpp"
 #include "server/access/audit_tail.hpp"
 #include "server/access/audit_trail.hpp"
 #include "test/support/print.hpp"
@@ -186,6 +189,32 @@ TEST_CASE("of the renamed files as many are kept as are wanted") {
   REQUIRE(found.size() == 1);
   CHECK(found[0].file == folder.file());
   CHECK(found[0].line == 1);
+}
+
+TEST_CASE("a rotation that finds no file descriptor, and is tried again, loses none of the renamed files") {
+  const Folder folder;
+  auto file = AuditFile::open({.file = folder.file(), .max_bytes = 300, .keep = 3}).value();
+  const std::vector<std::string> record{R"("event":"write","detail":")" + std::string(150, 'x') + '"'};
+  const auto renamed = [&](int number) { return read(folder.file("audit." + std::to_string(number))); };
+  for (int i = 0; i < 4; ++i) REQUIRE(file.write(record));
+  const auto newest = read(folder.file());
+  const auto first = renamed(1);
+  const auto second = renamed(2);
+  REQUIRE_FALSE(renamed(3).empty());
+  rlimit descriptors{};
+  ::getrlimit(RLIMIT_NOFILE, &descriptors);
+  const rlimit none{0, descriptors.rlim_max};
+  ::setrlimit(RLIMIT_NOFILE, &none);
+  int failed = 0;
+  for (int i = 0; i < 5; ++i) failed += file.write(record) ? 0 : 1;
+  ::setrlimit(RLIMIT_NOFILE, &descriptors);
+  CHECK(failed == 5);
+  REQUIRE(file.write(record));
+  CHECK(renamed(1) == newest);
+  CHECK(renamed(2) == first);
+  CHECK(renamed(3) == second);
+  CHECK(lines_of(folder.file()).size() == 1);
+  CHECK(findings_of({folder.file(), folder.file("audit.1"), folder.file("audit.2"), folder.file("audit.3")}).empty());
 }
 
 TEST_CASE("records that were edited, cut out, put elsewhere or cut off are found") {
