@@ -27,8 +27,9 @@ constexpr int resource_not_found = -32002;
 
 /// Which has requests that are answered with news.
 constexpr const char* listening_revision = "2026-07-28";
-/// After a cut.
-constexpr std::chrono::seconds listening_pause{1};
+/// After a cut; twice as long each time, until something is told: the gateway records each refusal.
+constexpr std::chrono::seconds first_pause{1};
+constexpr std::chrono::seconds longest_pause{300};
 
 /// What a member of an object says as text; empty where it is none.
 std::string text_in(const rr::Json& json, std::initializer_list<const char*> keys) {
@@ -77,6 +78,7 @@ struct McpBridge::Subscription {
   std::string uri;
   Message listening = {};
   boost::asio::steady_timer again;
+  std::chrono::seconds pause = first_pause;
   bool is_over = false;
 
   void end() {
@@ -183,7 +185,8 @@ rr::awaitable<void> McpBridge::keep_listening(std::shared_ptr<Subscription> subs
       give_up(subscription->id, subscription->uri, done ? "the gateway has ended its answer" : done.error().message);
       break;
     }
-    subscription->again.expires_after(listening_pause);
+    subscription->again.expires_after(subscription->pause);
+    subscription->pause = std::min(2 * subscription->pause, longest_pause);
     co_await subscription->again.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
   }
 }
@@ -194,6 +197,7 @@ void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
   if (method == "notifications/subscriptions/acknowledged") {
     const bool is_told = news["params"]["notifications"].contains("resourceSubscriptions");
     const auto id = std::exchange(subscription.id, nullptr);
+    if (is_told) subscription.pause = first_pause;
     if (!id.is_null() && is_told) return answer_empty(id);
     if (!id.is_null()) return give_up(id, uri, "there is no " + rr::quote(uri) + " whose changes can be told");
     if (!is_told) return subscription.listening.stream->close();  // not there yet

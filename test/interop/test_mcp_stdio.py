@@ -1,6 +1,9 @@
 """`rrgate mcp`: the Model Context Protocol on standard input and output, with the official Python SDK at the other end."""
 import contextlib
+import http.server
 import json
+import threading
+import time
 
 import pytest
 
@@ -180,3 +183,45 @@ def test_a_hostile_device_speaks_under_from_device_alone():
 def test_a_url_of_nothing_is_not_understood():
     assert Ran(["mcp", "rr+tpc://x"]).refused(NOT_UNDERSTOOD, "rr+tpc")
     assert Ran(["mcp", "rr+tcp://127.0.0.1:1/?service=a b"]).refused(NOT_UNDERSTOOD)
+
+
+@contextlib.contextmanager
+def listened_to(answers):
+    """The port of a gateway that tells a listener, or refuses it, and then ends its answer; and when it was asked."""
+    asked = []
+    told = {"jsonrpc": "2.0", "method": "notifications/subscriptions/acknowledged", "params": {
+        "notifications": {"resourceSubscriptions": ["rrgate://a"]}}}
+    refused = {"jsonrpc": "2.0", "id": 1, "error": {"code": -32602, "message": "no rule"}}
+
+    class Answer(http.server.BaseHTTPRequestHandler):
+        def do_POST(self):
+            self.rfile.read(int(self.headers["Content-Length"]))
+            is_told = answers[len(asked)] if len(asked) < len(answers) else False
+            asked.append(time.monotonic())
+            body = f"event: message\ndata: {json.dumps(told)}\n\n" if is_told else json.dumps(refused)
+            self.send_response(200)
+            self.send_header("Content-Type", "text/event-stream" if is_told else "application/json")
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body.encode())
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Answer) as server:
+        serving = threading.Thread(target=server.serve_forever)
+        serving.start()
+        yield server.server_port, asked
+        server.shutdown()
+        serving.join()
+
+
+def test_what_is_not_told_any_more_is_asked_for_ever_more_seldom_until_it_is_told(tmp_path):
+    with listened_to([True, False, True]) as (port, asked), speaking(tmp_path, f"http://127.0.0.1:{port}") as process:
+        say(process, "resources/subscribe", 1, uri="rrgate://a")
+        assert hear(process) == {"jsonrpc": "2.0", "id": 1, "result": {}}
+        assert hear(process)["method"] == "notifications/resources/updated"  # told again
+        wait_for(lambda: len(asked) == 5)
+    pauses = [after - before for before, after in zip(asked, asked[1:])]
+    assert pauses[0] >= 1 and pauses[1] >= 2  # refused once
+    assert pauses[2] < 4 and pauses[3] >= 2  # told, refused
