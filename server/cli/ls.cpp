@@ -231,12 +231,18 @@ std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
 std::vector<std::string> list_service_urls(const RemoteOptions& where, const std::string& type) {
   ListOptions options;
   static_cast<RemoteOptions&>(options) = where;
+  options.url = address_of_page(where.url);
   options.type = type;
-  const auto place = where.url.substr(0, where.url.find_first_of("?#"));
+  const auto place = options.url.substr(0, options.url.find_first_of("?#"));
   const bool is_device = place.find("/devices/") != std::string::npos;
+  const auto service =
+      rr::query_value(std::string_view(options.url).substr(std::min(place.size() + 1, options.url.size())), "service");
+  const auto is_wanted = [&](const FoundService& each) {
+    return !is_device || (each.url.starts_with(place + "?") && each.name == service.value_or(each.name));
+  };
   std::vector<std::string> out;
   for (const auto& each : list_services(options))
-    if (!each.name.empty() && (!is_device || each.url.starts_with(place + "?"))) out.push_back(each.url);
+    if (!each.name.empty() && is_wanted(each)) out.push_back(each.url);
   return out;
 }
 

@@ -62,7 +62,10 @@ std::vector<std::string> find_services(const RecordOptions& options) {
   };
   if (options.urls.empty()) return find_at({});
   std::vector<std::string> out;
-  for (const auto& url : options.urls) {
+  for (const auto& written : options.urls) {
+    const auto url = address_of_page(written);
+    if (url.find("#/devices/") != std::string::npos)
+      throw NotUnderstood(rr::quote(url) + " is the page of an object; expected that of its service or its device");
     const bool is_device = url.starts_with("http") && url.find("service=") == std::string::npos;
     const auto found = options.type.empty() && !is_device ? std::vector{url} : find_at(url);
     out.insert(out.end(), found.begin(), found.end());

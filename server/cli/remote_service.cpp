@@ -58,19 +58,6 @@ bool is_refusal(std::string_view text) {
          text.find("refused with status 403") != std::string_view::npos;
 }
 
-/// What the dashboard shows at ".../#/devices/NAME/SERVICE" is at ".../devices/NAME?service=SERVICE".
-std::optional<std::string> service_of_page(std::string_view url) {
-  constexpr std::string_view mark = "#/devices/";
-  const auto at = url.find(mark);
-  if (at == std::string_view::npos) return std::nullopt;
-  auto path = url.substr(at + mark.size());
-  path = path.substr(0, path.find('?'));
-  const auto slash = path.find('/');
-  if (slash == std::string_view::npos || path.find('/', slash + 1) != std::string_view::npos) return std::nullopt;
-  return gateway_base(url) + "/devices/" + std::string(path.substr(0, slash)) +
-         "?service=" + std::string(path.substr(slash + 1));
-}
-
 std::string member_names(const rr::EntityDefinition& type) {
   std::string out;
   for (const auto& member : type.members) out += (out.empty() ? "" : ", ") + member.name;
@@ -149,12 +136,24 @@ rr::RemoteObject open_service(const RemoteAddress& address) {
   return rr::connect(address.url, address.options);
 }
 
+std::string address_of_page(std::string_view url) {
+  constexpr std::string_view mark = "#/devices/";
+  const auto at = url.find(mark);
+  if (at == std::string_view::npos) return std::string(url);
+  auto path = url.substr(at + mark.size());
+  path = path.substr(0, path.find('?'));
+  const auto slash = path.find('/');
+  const auto device = path.substr(0, slash);
+  const auto service = slash == std::string_view::npos ? std::string_view() : path.substr(slash + 1);
+  if (device.empty() || service.find('/') != std::string_view::npos) return std::string(url);  // of an object
+  return gateway_base(url) + "/devices/" + std::string(device) +
+         (service.empty() ? "" : "?service=" + std::string(service));
+}
+
 std::string gateway_url(std::string_view url) {
+  const auto address = address_of_page(url);
   for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
-    if (url.starts_with(web)) {
-      auto out = native + std::string(url.substr(std::string_view(web).size()));
-      return service_of_page(out).value_or(out);
-    }
+    if (address.starts_with(web)) return native + address.substr(std::string_view(web).size());
   return {};
 }
 

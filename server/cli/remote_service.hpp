@@ -54,6 +54,9 @@ struct RemoteAddress {
 /// "http(s)://HOST:PORT/#/devices/NAME/SERVICE", where the login is the gateway's. Throws   NotUnderstood.
 RemoteAddress remote_address(const RemoteOptions& options);
 rr::RemoteObject open_service(const RemoteAddress& address);
+/// "http://h:1/devices/arm?service=Arm" of the dashboard's "http://h:1/#/devices/arm/Arm", "http://h:1/devices/arm" of
+/// "http://h:1/#/devices/arm"; other URLs, and those of an object's page, as they are.
+std::string address_of_page(std::string_view url);
 /// "rr+ws://h:1/devices/arm?service=Arm" of "http://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
 std::string gateway_url(std::string_view url);
 /// "http://h:1/robots" of "http://h:1/robots/devices/arm?service=Arm": by what a gateway goes, a path prefix included.

@@ -119,6 +119,34 @@ def test_services_are_recorded_by_their_type_and_by_the_name_of_a_gateways_devic
         gateway.process.stop()
 
 
+def test_a_page_of_the_dashboard_means_its_service_or_its_device(create, device, tmp_path):
+    gateway = Gateway(tmp_path, {"devices": [{"name": "robot", "url": create, "mode": "shared"},
+                                             {"name": "other", "url": device, "mode": "shared"}]})
+    try:
+        gateway.wait_for("device online", device="robot")
+        gateway.wait_for("device online", device="other")
+        base = f"http://127.0.0.1:{gateway.port}"
+        of_type = ["--type", "experimental.create2.Create"]
+
+        def recorded(*words):
+            file = tmp_path / "a.mcap"
+            rrgate("record", *words, "-o", file, "--duration", 0.2, "--force")
+            return [service["name"] for service in json.loads(rrgate("info", file, "--json"))["services"]]
+
+        for page in "robot/Create", "robot/Create?view=members", "robot":
+            assert recorded(f"{base}/#/devices/{page}") == recorded(f"{base}/#/devices/{page}", *of_type) == ["Create"]
+        assert recorded(f"{base}/#/devices/other/device") == recorded(f"{base}/devices/other") == ["device"]
+        for page in "other", "other/device":
+            said = rrgate("record", f"{base}/#/devices/{page}", *of_type, "-o", tmp_path / "none.mcap", code=3)
+            assert "no service of type experimental.create2.Create" in said
+        said = rrgate("record", f"{base}/devices/robot?service=None", *of_type, "-o", tmp_path / "none.mcap", code=3)
+        assert "no service of type" in said
+        said = rrgate("record", f"{base}/#/devices/other/device/axes/3", "-o", tmp_path / "none.mcap", code=2)
+        assert "is the page of an object" in said
+    finally:
+        gateway.process.stop()
+
+
 def test_each_message_is_what_its_schema_says(of_create):
     import jsonschema
     with open(of_create, "rb") as file:
