@@ -58,7 +58,10 @@ int Commands::run(std::vector<std::string> words) {
     std::cerr << path << ": " << mistake.what() << "; see " << path << " --help\n";
     return exit_usage;
   }
-  return chosen_();
+  const int code = chosen_();
+  if (code != exit_ok || std::cout.flush()) return code;
+  std::cerr << path_of(app_) << ": standard output can't be written\n";
+  return exit_failed;
 }
 
 void print_json_line(const nlohmann::ordered_json& json) {

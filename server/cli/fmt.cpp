@@ -1,4 +1,9 @@
 // rrgate fmt: service definitions in one layout. Layer: server/cli.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
 #include "core/robdef/format/format_source.hpp"
 #include "node/platform/text_file.hpp"
 #include "server/cli/definition_options.hpp"
@@ -12,6 +17,33 @@ struct FormatOptions : DefinitionOptions {
   bool is_check = false;
   bool is_json = false;
 };
+
+bool write_whole(int file, std::string_view text) {
+  while (!text.empty()) {
+    const auto written = ::write(file, text.data(), text.size());
+    if (written <= 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::fsync(file) == 0;
+}
+
+/// The file is there whole all the time: what it was, or what it is to be. It keeps its mode, and where
+/// root writes its owner. False: it could not be written, and is what it was.
+bool replace_file(const std::string& path, std::string_view text) {
+  std::error_code error;
+  const auto target = std::filesystem::canonical(path, error).string();  // a link stays one
+  struct stat before {};
+  if (error || ::access(target.c_str(), W_OK) != 0 || ::stat(target.c_str(), &before) != 0) return false;
+  auto fresh = target + ".XXXXXX";
+  const int file = ::mkstemp(fresh.data());
+  if (file < 0) return false;
+  const bool is_given = ::fchown(file, before.st_uid, before.st_gid) == 0 || ::geteuid() != 0;
+  const bool is_complete = is_given && ::fchmod(file, before.st_mode & 0777u) == 0 && write_whole(file, text);
+  ::close(file);
+  if (is_complete && ::rename(fresh.c_str(), target.c_str()) == 0) return true;
+  ::unlink(fresh.c_str());
+  return false;
+}
 
 int format(const FormatOptions& options) {
   int code = exit_ok;
@@ -46,7 +78,7 @@ int format(const FormatOptions& options) {
         std::cout << formatted;
     } else {
       const auto formatted = rr::format_source(source.definition);
-      if (!write_text_file(file, formatted)) {
+      if (formatted != *text && !replace_file(file, formatted)) {
         std::cerr << file << ": error: cannot be written\n";
         code = exit_failed;
       } else if (options.is_json) {

@@ -2,10 +2,13 @@
 #include <cmath>
 #include <csignal>
 #include <ctime>
+#include <functional>
 #include <iomanip>
 #include <iostream>
+#include <memory>
 #include <optional>
 
+#include "core/session/service_path.hpp"
 #include "node/driver/clocks.hpp"
 #include "node/platform/utc_time.hpp"
 #include "server/cli/csv.hpp"
@@ -17,6 +20,8 @@ namespace rrgate {
 namespace {
 
 using std::chrono::steady_clock;
+
+constexpr std::chrono::seconds print_limit{10};
 
 volatile std::sig_atomic_t is_interrupted = 0;
 
@@ -104,45 +109,61 @@ class ValuePrinter {
   std::vector<std::string> columns_;
 };
 
-void begin_watching(const RemoteMember& found, ValuePrinter& printer) {
+/// Returns  whether the service still has open what is watched.
+std::function<bool()> begin_watching(const RemoteMember& found, ValuePrinter& printer) {
   using enum rr::MemberKind;
   expect_kind(found, {wire, pipe, event}, "watch");
   const auto& member = *found.member;
   const auto json_of = [&member, types = &found.types()](const rr::Value& value) {
     return to_json(value, member.type, *types);
   };
+  const auto is_closed = std::make_shared<bool>(false);
+  auto& connection = found.object.connection().asynchronous();
   if (member.kind == wire) {
+    // First: the service may close the wire right behind its answer.
+    connection.on_wire_closed(found.object.path(), member.name, [is_closed] { *is_closed = true; });
     found.object.connect_wire(member.name, [&printer, json_of](const rr::Value& value, rr::TimeSpec sent) {
       printer.print(json_of(value), sent);
     });
   } else if (member.kind == pipe) {
-    found.object.connect_pipe(member.name,
-                              [&printer, json_of](const rr::Value& value) { printer.print(json_of(value)); });
+    const auto packets = found.object.connect_pipe(
+        member.name, [&printer, json_of](const rr::Value& value) { printer.print(json_of(value)); });
+    return [packets] { return packets.is_open(); };
   } else {
+    connection.on_path_released([is_closed, path = found.object.path()](const std::string& released) {
+      if (rr::is_within(path, released)) *is_closed = true;
+    });
     found.object.on_event(member.name, [&printer, &member, types = &found.types()](std::span<const rr::Value> values) {
       const auto json = rr::arguments_to_json(values, member, *types, {});
       if (!json) throw rr::ClientException(json.error());
       printer.print(*json);
     });
   }
+  return [is_closed] { return !*is_closed; };
 }
 
 void watch(const RemoteMember& found, ValuePrinter& printer, std::optional<steady_clock::time_point> until) {
   auto& connection = found.object.connection();
   const auto begin = steady_clock::now();
-  begin_watching(found, printer);
+  const auto end = std::make_shared<std::string>("the connection was lost");
+  connection.asynchronous().on_closed([end](const rr::Error& reason) { *end += ": " + reason.message; });
+  const auto is_open = begin_watching(found, printer);
   is_interrupted = 0;
   std::signal(SIGINT, interrupt);
   std::signal(SIGTERM, interrupt);
   const auto is_over = [&] {
-    return is_interrupted || printer.is_done() || connection.is_closed() || (until && steady_clock::now() >= *until);
+    return is_interrupted || printer.is_done() || connection.is_closed() || !is_open() || !std::cout ||
+           (until && steady_clock::now() >= *until);
   };
   while (!is_over()) connection.run_until(is_over, std::chrono::milliseconds(100));
+  if (!is_open() || connection.is_closed())
+    connection.run_until([] { return true; }, print_limit);  // what came before the end
   const std::chrono::duration<double> seconds = steady_clock::now() - begin;
   std::cerr << printer.count() << " values in " << std::fixed << std::setprecision(1) << seconds.count() << " s, "
             << static_cast<double>(printer.count()) / seconds.count() << " /s\n";
-  if (connection.is_closed() && !printer.is_done())
-    throw rr::ClientException(rr::make_error(rr::ErrorCode::connection_error, "the connection was lost"));
+  if (is_open() && !connection.is_closed()) return;
+  if (!connection.is_closed()) *end = "the service has closed it";
+  if (!printer.is_done()) throw rr::ClientException(rr::make_error(rr::ErrorCode::connection_error, *end));
 }
 
 struct WatchOptions : RemoteOptions {

@@ -8,9 +8,11 @@ import math
 import os
 import pathlib
 import re
+import select
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -18,6 +20,7 @@ import pytest
 import RobotRaconteur as RR
 
 from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UNREACHABLE, Ran, run, shown_on_terminal
+from directions import PEERS
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
 from processes import BUILD, Background, free_port
@@ -205,6 +208,50 @@ def test_events_are_watched(node, tmp_path):
         node.DisconnectService(driver)
     finally:
         robot.stop()
+
+
+@pytest.fixture
+def axes(tmp_path):
+    """A device of the real package whose axes come and go; its process and its URL."""
+    port = free_port()
+    device = Background([sys.executable, PEERS / "recorded_device.py", port], tmp_path / "log")
+    device.next_line()
+    yield device, f"rr+tcp://127.0.0.1:{port}/?service=device"
+    device.stop()
+
+
+class Watching:
+    """rrgate watch, which has shown a value of the axis."""
+
+    def __init__(self, url, member):
+        self.process = subprocess.Popen([RRGATE, "watch", url, f"axes/3/{member}", "--json"], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)
+        while not select.select([self.process.stdout], [], [], 0.1)[0]:
+            Ran(["call", url, "tell", "1"])  # refused as long as nobody has asked for the axis
+        assert "value" in json.loads(self.process.stdout.readline())
+
+    def ended(self):
+        """What it says in the end, by itself."""
+        said = self.process.communicate(timeout=20)[1]
+        assert self.process.returncode == UNREACHABLE, said
+        return said
+
+
+@pytest.mark.parametrize("member", ["angle", "turns", "turned"])
+def test_a_watch_ends_with_what_it_watches(axes, member):
+    device, url = axes
+    watching = Watching(url, member)
+    run("call", url, "release_axis")
+    assert watching.ended().endswith("the service has closed it\n")
+    watching = Watching(url, member)
+    device.stop()
+    assert re.search(r"the connection was lost: \w", watching.ended())
+
+
+def test_a_watch_ends_when_nobody_can_hear_of_it(reynard):
+    with open("/dev/full", "w") as full:
+        watching = subprocess.run([RRGATE, "watch", reynard, "state"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=30)
+    assert watching.returncode == FAILED and watching.stderr.endswith("rrgate watch: standard output can't be written\n")
 
 
 def test_requests_are_timed(url):

@@ -1,6 +1,7 @@
 """What all commands of rrgate have in common, found by walking through their help: --json, exit codes, and how they refuse."""
 import json
 import re
+import resource
 import signal
 import subprocess
 
@@ -118,6 +119,35 @@ def test_service_definitions(tmp_path):
     assert told("generate", "ts", good, "-o", tmp_path / "lamp.ts") == {"file": str(tmp_path / "lamp.ts")}
     files = [json.loads(line)["file"] for line in run("generate", "cpp", good, "-o", tmp_path, "--json").splitlines()]
     assert [file.rsplit(".", 1)[1] for file in files] == ["hpp", "cpp"]
+
+
+def test_a_definition_is_whole_while_it_is_formatted(tmp_path):
+    file, link = tmp_path / "lamp.robdef", tmp_path / "link.robdef"
+    loose = DEFINITION.replace("    property", "  property")
+    file.write_text(loose)
+    file.chmod(0o640)
+    link.symlink_to(file)
+    with open(file) as reader:
+        run("fmt", "--in-place", link)
+        assert reader.read() == loose
+    assert file.read_text() == DEFINITION and file.stat().st_mode & 0o777 == 0o640 and link.is_symlink()
+    file.write_text(loose)
+    full = subprocess.run([RRGATE, "fmt", "--in-place", file], preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8, 8)),
+                          restore_signals=False, capture_output=True, text=True)
+    assert (full.returncode, full.stderr) == (FAILED, f"{file}: error: cannot be written\n")
+    assert file.read_text() == loose and sorted(tmp_path.iterdir()) == [file, link]
+
+
+def test_what_could_not_be_printed_is_a_failure(tmp_path):
+    def run_into_full_disk(*command):
+        with open("/dev/full", "w") as full:
+            return subprocess.run([RRGATE, *map(str, command)], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+
+    for name, *more in ["ci"], ["other", "--json"]:
+        ran = run_into_full_disk("token", tmp_path / "tokens", name, *more)
+        assert ran.returncode == FAILED and ran.stderr.endswith("rrgate token: standard output can't be written\n")
+    assert run_into_full_disk("fmt", tmp_path / "none.robdef").stderr.count("\n") == 1
+    assert run_into_full_disk("token", tmp_path / "tokens", "ci", "--delete", "--json").returncode == FAILED
 
 
 def test_completions():

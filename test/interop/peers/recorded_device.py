@@ -16,6 +16,8 @@ struct Pose
 end
 object Axis
     wire double angle [readonly]
+    pipe double turns [readonly]
+    event turned(double angle)
 end
 object Device
     property int32 gain
@@ -23,12 +25,14 @@ object Device
     event said(string text, int32 number)
     objref Axis{int32} axes
     function void tell(int32 number)
+    function void release_axis()
 end
 """
 
 
 class Axis:
-    pass
+    def __init__(self):
+        self.turned = RR.EventHook()
 
 
 class Device:
@@ -48,6 +52,12 @@ class Device:
         self.poses.AsyncSendPacket(pose, lambda: None)
         self.said.fire("hello, \"you\"", number)
         self.axis.angle.OutValue = number * 0.1
+        self.axis.turns.AsyncSendPacket(number * 0.1, lambda: None)
+        self.axis.turned.fire(number * 0.1)
+
+    def release_axis(self):
+        RR.ServerContext.GetCurrentServerContext().ReleaseServicePath("device.axes[3]")
+        self.axis = Axis()
 
 
 if __name__ == "__main__":
