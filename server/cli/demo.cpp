@@ -403,7 +403,7 @@ int demo(const DemoOptions& options) {
   std::optional<asio::signal_set> deaths;
   std::function<void()> wait_for_death = [&] {
     deaths->async_wait([&](const rr::error_code& error, int) {
-      if (error) return;
+      if (error || !deaths) return;  // a signal that came in the last moment is not cancelled
       note_dead_devices(devices);
       wait_for_death();
     });
@@ -411,7 +411,7 @@ int demo(const DemoOptions& options) {
   const auto code = run_gateway(make_config(devices, port, user), [&](auto& io, Gateway& gateway,
                                                                       const auto& addresses) {
     deaths.emplace(io, SIGCHLD);
-    gateway.on_stop([&] { deaths->cancel(); });
+    gateway.on_stop([&] { deaths.reset(); });  // it may not outlive `io`
     wait_for_death();
     const bool opens_browser = !options.is_lan && !options.is_without_browser;
     asio::co_spawn(io, announce(gateway, addresses.front().port, user, options.is_json, opens_browser), asio::detached);

@@ -154,7 +154,7 @@ class Demo(Files):
     def start(self, *options):
         """Returns the URL of its pages; what it said before is in self.said."""
         self.log = self.enterContext(tempfile.TemporaryFile("w+"))
-        process = subprocess.Popen([RRGATE, "demo", "--port", "0", *options], stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.process = process = subprocess.Popen([RRGATE, "demo", "--port", "0", *options], stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
@@ -169,6 +169,11 @@ class Demo(Files):
         self.start()
         self.log.seek(0)
         self.assertEqual(self.log.read(), "")  # no device was offline
+
+    def test_it_ends_well(self):
+        self.start("create-minimal")
+        self.process.terminate()
+        self.assertEqual(self.process.wait(30), 0)
 
     def test_code_of_a_service_that_runs(self):
         pages = self.start()
