@@ -1,4 +1,7 @@
 // rrgate get, set, call: single values of a device. Layer: server/cli.
+#include <unistd.h>
+
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 
@@ -28,6 +31,24 @@ bool is_image_name(const std::string& file) {
   return file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg");
 }
 
+bool can_write(const std::string& file) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path path(file);
+  if (fs::exists(path, error)) return !fs::is_directory(path, error) && ::eaccess(file.c_str(), W_OK) == 0;
+  const auto folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  return path.has_filename() && ::eaccess(folder.c_str(), W_OK | X_OK) == 0;
+}
+
+/// Before the device does anything. Throws   NotUnderstood: the file's name is an image's, and the value none;
+/// std::runtime_error: the file can't be written.
+void check_output(const rr::TypeDefinition& type, const rr::TypeRegistry& types, const ValueOptions& options) {
+  const auto& file = options.output;
+  if (is_image_name(file) && !is_image_type(type, types))
+    throw NotUnderstood("its value is no image: " + rr::format_type(type));
+  if (!file.empty() && !can_write(file)) throw std::runtime_error(file + ": can't be written");
+}
+
 /// To the terminal, or to the file that --output names.
 void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types,
              const ValueOptions& options) {
@@ -35,7 +56,6 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   if (file.empty()) return print_value(to_json(value, type, types), options.is_json);
   std::string content;
   if (is_image_name(file)) {
-    if (!is_image_type(type, types)) throw NotUnderstood("its value is no image: " + rr::format_type(type));
     const auto work = prepare_image(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
     auto image = work ? encode_image(*work) : work.error();
     if (!image) throw rr::ClientException(image.error());
@@ -105,6 +125,7 @@ rr::Value read_memory(const rr::RemoteObject& object, const std::string& name) {
 
 void get_value(const RemoteMember& found, const ValueOptions& options) {
   const auto& name = found.member->name;
+  check_output(found.member->type, found.types(), options);
   rr::Value value;
   if (found.member->kind == memory)
     value = read_memory(found.object, name);
@@ -180,6 +201,7 @@ void call_function(const RemoteMember& found, const ValueOptions& options) {
     for (const auto& value : generator) sink.deliver(value, type, found.types());
     return;
   }
+  check_output(type, found.types(), options);
   const auto result = wait_showing_bytes(found.object, [&](auto& connection, auto done) {
     connection.call(found.object.path(), member.name, values, std::move(done));
   });

@@ -326,6 +326,20 @@ def test_values_go_to_files(reynard, tmp_path):
     assert Ran(["get", reynard, "color", "-o", tmp_path / "color.png"]).refused(NOT_UNDERSTOOD, "no image: double[]")
 
 
+def test_nothing_is_called_whose_result_could_not_be_kept(axes, tmp_path):
+    _, url = axes
+
+    def call(output):
+        return Ran(["call", url, "tell", "7", "-o", output])
+
+    for output in "/nowhere/pose", tmp_path, f"{tmp_path}/":
+        assert call(output).refused(FAILED, f"{output}: can't be written")
+    assert call(tmp_path / "pose.png").refused(NOT_UNDERSTOOD, "its value is no image: void")
+    assert run("get", url, "gain") == "0" and not (tmp_path / "pose.png").exists()
+    run("info", url, "axes/3")  # what it tells needs the axis
+    assert call(tmp_path / "pose.json").code == DONE and run("get", url, "gain") == "7"
+
+
 def test_each_value_of_a_generator_is_a_line_of_the_file(tmp_path):
     service, url = start_service(tmp_path)
     try:
