@@ -85,6 +85,18 @@ rr::Result<std::string> make_line(const std::string& name, std::string_view befo
   return line;
 }
 
+/// Empty where there is no file.
+rr::Result<std::string> read_users(const std::string& file) {
+  std::error_code error;
+  auto text = read_text_file(file);
+  if (!text && std::filesystem::exists(file, error))
+    return rr::make_error(rr::ErrorCode::io_error, file + ": can't be read");
+  if (!text) return std::string();
+  if (const auto users = rr::PasswordFileAuthenticator::from_text(*text, {.accepts_md5 = true}); !users)
+    return rr::make_error(users.error().code, file + ": " + users.error().message);
+  return std::move(*text);
+}
+
 struct PasswordOptions {
   std::string file;
   std::string name;
@@ -97,21 +109,22 @@ int set_password(const PasswordOptions& options) {
   const auto& [file, name, roles, deletes, is_json] = options;
   if (auto checked = check_name("user name", name); !checked) return usage_error("passwd", checked.error().message);
 
-  std::error_code error;
-  const auto old = read_text_file(file);
-  if (!old && std::filesystem::exists(file, error)) return report_failure("passwd", file + ": can't be read");
-  const auto text = old.value_or("");
-  if (const auto users = rr::PasswordFileAuthenticator::from_text(text, {.accepts_md5 = true}); !users)
-    return report_failure("passwd", file + ": " + users.error().message);
-  const auto before = find_line(text, name);
+  auto text = read_users(file);
+  if (!text) return report_failure("passwd", text.error().message);
+  const std::string before(find_line(*text, name));
   if (deletes && before.empty()) return report_failure("passwd", file + " has no user " + rr::quote(name));
   std::string line;
   if (!deletes) {
     auto made = make_line(name, before, roles);
     if (!made) return report_failure("passwd", made.error().message);
     line = std::move(*made);
+    text = read_users(file);  // whoever typed took his time
+    if (!text) return report_failure("passwd", text.error().message);
+    if (find_line(*text, name) != before)
+      return report_failure("passwd",
+                            file + ": user " + rr::quote(name) + " was changed meanwhile; nothing was changed");
   }
-  if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
+  if (auto done = rr::write_secret(file, with_line(*text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("passwd", done.error().message);
   const std::string change = deletes ? "deleted" : before.empty() ? "added" : "changed";
   if (is_json)

@@ -1,6 +1,8 @@
 #include <catch2/catch.hpp>
 
+#include "node/platform/text_file.hpp"
 #include "server/access/access.hpp"
+#include "server/access/access_text.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/printable.hpp"
 #include "server/config/config.hpp"
@@ -108,6 +110,45 @@ TEST_CASE("init: the configuration has a key of its own, so that sign-ins outliv
   const auto again = test::run_command("init", {std::filesystem::path(other.path("x")).parent_path().string()});
   CHECK(again.code == 1);
   CHECK_THAT(again.errors, Catch::Contains("tickets.key: is there already; nothing was written"));
+}
+
+TEST_CASE("passwd: what others have changed while the password was typed stays") {
+  /// Types a password, and whatever else happens meanwhile.
+  struct Typist : std::streambuf {
+    std::string typed = "secret\nsecret\n";
+    std::function<void()> meanwhile;
+    int underflow() override {
+      if (eback()) return traits_type::eof();
+      if (meanwhile) meanwhile();
+      setg(typed.data(), typed.data(), typed.data() + typed.size());
+      return traits_type::to_int_type(*gptr());
+    }
+  };
+  const test::Folder folder;
+  const auto users = folder.path("users");
+  const auto set = [&](const std::string& name, std::function<void()> meanwhile) {
+    Typist typist;
+    typist.meanwhile = std::move(meanwhile);
+    auto* const before = std::cin.rdbuf(&typist);
+    const auto ran = test::run_command("passwd", {users, name});
+    std::cin.rdbuf(before);
+    std::cin.clear();
+    return ran;
+  };
+  REQUIRE(set("alice", {}).code == exit_ok);
+  REQUIRE(set("alice", [&] { REQUIRE(set("bob", {}).code == exit_ok); }).code == exit_ok);
+  const auto both = read_text_file(users).value();
+  CHECK(!find_line(both, "alice").empty());
+  CHECK(!find_line(both, "bob").empty());
+
+  std::string others;
+  const auto refused = set("alice", [&] {
+    REQUIRE(test::run_command("passwd", {users, "alice", "--delete"}).code == exit_ok);
+    others = read_text_file(users).value();
+  });
+  CHECK(refused.code == exit_failed);
+  CHECK_THAT(refused.errors, Catch::Contains("user 'alice' was changed meanwhile; nothing was changed"));
+  CHECK(read_text_file(users) == others);
 }
 
 TEST_CASE("what would command a terminal is shown as question marks") {
