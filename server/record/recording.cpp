@@ -227,6 +227,17 @@ std::string recorded_ring(const std::string& path) {
   return ring == metadata->texts.end() ? std::string() : ring->second;
 }
 
+bool has_recorded_messages(const std::string& path) {
+  auto reader = McapReader::open(path);
+  if (!reader) return true;
+  for (;;) {
+    const auto record = reader->next();
+    if (!record) return true;
+    if (!*record) return false;
+    if ((*record)->opcode == McapOpcode::chunk || (*record)->opcode == McapOpcode::message) return true;
+  }
+}
+
 std::string mcap_time_text(McapTime time) {
   constexpr McapTime second = 1'000'000'000;
   return rr::format_utc({static_cast<std::int64_t>(time / second), static_cast<std::int32_t>(time % second)}, 9);

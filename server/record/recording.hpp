@@ -78,6 +78,8 @@ class Recording {
 
 /// The ring that a file says it belongs to; empty: to none, or it can't be read. Reads its beginning alone.
 std::string recorded_ring(const std::string& path);
+/// True also where that can't be told.
+bool has_recorded_messages(const std::string& path);
 
 /// "2026-11-24T15:00:00.000000000Z"
 std::string mcap_time_text(McapTime time);

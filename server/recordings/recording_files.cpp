@@ -145,7 +145,12 @@ std::deque<std::string> find_ring(const std::string& folder, const RecordingWish
     for (const auto& file : files) {
       auto path = (fs::path(folder) / file.name).string();
       const auto ring = recorded_ring(path);
-      if (ring == own || (!ring.empty() && !is_of_another(ring))) out.push_back(std::move(path));
+      if (ring != own && (ring.empty() || is_of_another(ring))) continue;
+      std::error_code ignored;
+      if (has_recorded_messages(path))
+        out.push_back(std::move(path));
+      else
+        fs::remove(path, ignored);
     }
   }
   return out;

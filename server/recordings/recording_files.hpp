@@ -46,7 +46,8 @@ RecordingFiles look_into(const std::string& folder, std::string_view recording);
 /// by the members that they have. Empty: it is none.
 std::string ring_of(const RecordingWish& standing);
 /// Paths of its files that are there, oldest first: also those of a ring of the same service that nobody wants any
-/// more. `standing`  all that the configuration wants. `under_way`  recordings whose files are left out.
+/// more. Those without a message, as a gateway that is killed leaves them, are deleted instead. `standing`  all that
+/// the configuration wants. `under_way`  recordings whose files are left out.
 std::deque<std::string> find_ring(const std::string& folder, const RecordingWish& wish,
                                   const std::vector<RecordingWish>& standing, const std::set<std::string>& under_way);
 

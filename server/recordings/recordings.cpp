@@ -312,7 +312,9 @@ void Recordings::end_run(Run& run, std::optional<rr::Error> failure) {
   const auto path = run.writer->path();
   run.writer.reset();
   std::error_code ignored;  // whoever removed it was faster
-  if (failure && run.info.messages == 0) fs::remove(path, ignored);
+  // Of a ring, an empty one would take the place of one that holds something.
+  const bool is_of_ring = run.info.is_standing && !ring_of(run.wish).empty();
+  if ((failure || is_of_ring) && run.info.messages == 0) fs::remove(path, ignored);
   run.info.state = failure ? RecordingState::failed : RecordingState::ended;
   if (failure) {
     run.info.problem = failure->message;

@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "server/record/recording_writer.hpp"
+#include "test/server/support/ring_file.hpp"
 #include "test/support/folder.hpp"
 
 using namespace rrgate;
@@ -21,12 +21,9 @@ RecordingWish ring(std::vector<std::string> members = {"*"}, std::size_t kept = 
 }
 
 /// A file that says it is of a ring, or of none.
-std::string write_file(const test::Folder& folder, const std::string& name, const std::string& of) {
-  RecordingOptions options;
-  options.ring = of;
-  auto writer = RecordingWriter::create(folder.path(name), options).value();
-  REQUIRE(writer.close().has_value());
-  return folder.path(name);
+std::string write_file(const test::Folder& folder, const std::string& name, const std::string& of,
+                       test::RingFile kind = test::RingFile::with_message) {
+  return test::write_ring_file(folder.path(name), of, kind);
 }
 
 }  // namespace
@@ -85,4 +82,19 @@ TEST_CASE("recordings: a ring has the files of former runs, and nobody else's") 
   const auto found = find_ring(folder.path(""), wish, {wish, other}, {"arm.Arm.20261128T083000123Z"});
   CHECK(found == expected);
   CHECK(find_ring(folder.path(""), ring({"*"}, 0), {}, {}).empty());
+}
+
+TEST_CASE("recordings: files of a ring without a message are deleted, not counted") {
+  using enum test::RingFile;
+  const test::Folder folder;
+  const auto wish = ring();
+  const auto empty = write_file(folder, "arm.Arm.20261125T083000123Z.mcap", ring_of(wish), without_message);
+  const auto killed = write_file(folder, "arm.Arm.20261126T083000123Z.mcap", ring_of(wish), without_end);
+  const auto full = write_file(folder, "arm.Arm.20261127T083000123Z.mcap", ring_of(wish));
+  const auto of_client = write_file(folder, "arm.Arm.20261127T093000123Z.mcap", "", without_message);
+  const auto of_other = write_file(folder, "leg.Arm.20261127T093000123Z.mcap", ring_of(wish), without_message);
+  const auto under_way = write_file(folder, "arm.Arm.20261128T083000123Z.mcap", ring_of(wish), without_end);
+  CHECK(find_ring(folder.path(""), wish, {wish}, {"arm.Arm.20261128T083000123Z"}) == std::deque<std::string>{full});
+  for (const auto& gone : {empty, killed}) CHECK_FALSE(std::filesystem::exists(gone));
+  for (const auto& there : {full, of_client, of_other, under_way}) CHECK(std::filesystem::exists(there));
 }

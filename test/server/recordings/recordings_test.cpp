@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 
+#include "test/server/support/ring_file.hpp"
 #include "test/support/folder.hpp"
 
 using namespace rrgate;
@@ -85,10 +86,7 @@ struct RecordedArm {
   }
   bool has(const std::string& name) const { return std::filesystem::exists(folder.path(name)); }
   std::string ring_file(const std::string& name) {
-    RecordingOptions options;
-    options.ring = ring_of(wish(1));
-    auto writer = RecordingWriter::create(folder.path(name), options).value();
-    REQUIRE(writer.close().has_value());
+    test::write_ring_file(folder.path(name), ring_of(wish(1)));
     return name;
   }
 };
@@ -111,6 +109,22 @@ TEST_CASE("recordings: a ring of files goes on over a restart of the gateway") {
   CHECK(made.has(former[2]));
   CHECK(made.has(former[3]));
   REQUIRE(begun.files.size() == 1);
+}
+
+TEST_CASE("recordings: a ring keeps its files while the gateway is started again and the device stays away") {
+  RecordedArm made;
+  for (const auto* name : {&former[0], &former[1]}) made.ring_file(*name);
+  for (int start = 0; start < 3; ++start) {
+    made.config.recordings.standing = {RecordedArm::wish(3)};
+    made.recordings.follow_config();
+    const auto begun = made.standing();
+    CHECK(begun.files.size() == 1);
+    made.config.recordings.standing.clear();  // as at a stop of the gateway
+    made.recordings.follow_config();
+    CHECK_FALSE(made.has(begun.name + ".mcap"));
+  }
+  CHECK(made.has(former[0]));
+  CHECK(made.has(former[1]));
 }
 
 TEST_CASE("recordings: a ring makes room where the folder is full") {
