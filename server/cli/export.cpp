@@ -1,5 +1,6 @@
 // rrgate export: the messages of a recorded member as comma-separated values. Layer: server/cli.
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iostream>
@@ -110,6 +111,9 @@ const RecordedMember* find_member(const Recording& recording, const std::string&
 
 int run_export(const ExportOptions& options) {
   if (!options.is_csv && !options.is_json) return usage_error("export", "expected --csv or --json");
+  std::error_code error;
+  if (std::filesystem::equivalent(options.file, options.output, error))
+    return usage_error("export", options.output + " is the recording itself; -o takes another file");
   auto recording = Recording::open(options.file);
   if (!recording) return report_failure("export", recording.error().message);
   const auto* member = find_member(*recording, options.member);

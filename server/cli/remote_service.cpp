@@ -120,7 +120,7 @@ RemoteAddress remote_address(const RemoteOptions& options) {
     credentials.items.emplace_back("password", rr::Value(password));
     if (!user.empty()) out.options.credentials = rr::Value(std::move(credentials));
   } else {
-    StoredLogin login{user, password, environment("RRGATE_TOKEN")};
+    StoredLogin login{user, password, user.empty() ? environment("RRGATE_TOKEN") : ""};
     if (login.user.empty() && login.token.empty()) login = find_stored_login(gateway_base(url));
     const auto header = authorization(login);
     if (!header.empty()) out.options.dial.headers.emplace_back("Authorization", header);

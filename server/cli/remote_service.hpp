@@ -42,8 +42,8 @@ CLI::Option* add_json(CLI::App& app, RemoteOptions& options);
 /// A whole number from 1 on.
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary);
 
-/// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; a gateway's token that of
-/// $RRGATE_TOKEN. Where neither is given, a gateway's login is the stored one.
+/// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; without --user, a gateway's token is
+/// that of $RRGATE_TOKEN. Where neither is given, a gateway's login is the stored one.
 struct RemoteAddress {
   std::string url;  ///< a Robot Raconteur URL
   rr::ConnectOptions options = {};

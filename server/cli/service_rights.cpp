@@ -47,6 +47,12 @@ std::vector<WantedFile> wanted_files(const std::string& file, const Config& conf
     std::error_code error;
     if (fs::exists(audit, error)) wanted.push_back({audit, W_OK});
   }
+  if (!config.recordings.folder.empty()) {
+    auto folder = fs::absolute(config.recordings.folder);
+    std::error_code error;
+    while (folder.has_relative_path() && !fs::exists(folder, error)) folder = folder.parent_path();  // that is made
+    wanted.push_back({folder.string(), R_OK | W_OK | X_OK, "nothing can be recorded"});
+  }
   return wanted;
 }
 

@@ -467,6 +467,34 @@ def test_check_config_warns_of_tokens_that_the_service_cannot_write(tmp_path_fac
         assert "can't write" not in Ran(["check-config", folder / "gateway.json", "--as-service", user]).error
 
 
+def test_check_config_warns_of_recordings_that_the_service_cannot_write(tmp_path_factory):
+    user = "nobody" if os.geteuid() == 0 else getpass.getuser()
+    with tempfile.TemporaryDirectory() as name:  # below folders that everybody may enter
+        folder = pathlib.Path(name)
+        config = {"listen": ["127.0.0.1:1"], "devices": [], "recordings": {"folder": "runs/today"}}
+        (folder / "gateway.json").write_text(json.dumps(config))
+        (folder / "gateway.json").chmod(0o644)
+
+        def warnings():
+            ran = Ran(["check-config", folder / "gateway.json", "--as-service", user])
+            assert ran.code == DONE and "good" in ran.out
+            return [line for line in ran.error.splitlines() if "can't write" in line]
+
+        def is_warned_of(where):
+            (warning,) = warnings()
+            return f"user '{user}' can't write {where}: " in warning and "nothing can be recorded" in warning
+
+        folder.chmod(0o555)
+        assert is_warned_of(folder)  # where it would be made
+        folder.chmod(0o777)
+        assert not warnings()
+        (folder / "runs" / "today").mkdir(parents=True)
+        (folder / "runs" / "today").chmod(0o555)
+        assert is_warned_of(folder / "runs" / "today")
+        (folder / "runs" / "today").chmod(0o777)
+        assert not warnings()
+
+
 def test_services_are_listed(reynard, url):
     if url == reynard:
         found = json.loads(run("ls", reynard.split("?")[0], "--json"))
@@ -550,6 +578,8 @@ def test_logins_are_kept_in_a_file(guarded, token, tmp_path):
     vera = {**environment, "RRGATE_PASSWORD": PASSWORDS["vera"]}  # what the command line says, holds
     assert Ran(["set", guarded, "color", "[1, 1, 1]", "--user", "vera"], environment=vera).refused(REFUSED, "vera")
     assert Ran(["get", guarded, "color"], environment={**environment, "RRGATE_TOKEN": "guess"}).refused(REFUSED, "401")
+    vera["RRGATE_TOKEN"] = token[1]
+    assert Ran(["set", guarded, "color", "[1, 1, 1]", "--user", "vera"], environment=vera).refused(REFUSED, "vera")
     write({"gateways": {base: {"token": "guess"}}})
     assert is_refused(REFUSED, "401")
     write({"gateways": {"http://127.0.0.1": alice}})  # another port

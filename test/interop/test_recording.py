@@ -285,6 +285,12 @@ def test_a_member_is_exported_as_a_table(of_create, tmp_path):
     assert (tmp_path / "way.csv").read_text().startswith("time,value\n")
     assert "--member takes one of: " in rrgate("export", of_create, "--csv", code=2)
     assert "no one member 'nonesuch'" in rrgate("export", of_create, "--csv", "--member", "nonesuch", code=2)
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(of_create.read_bytes())
+    (tmp_path / "link.mcap").symlink_to(copy)
+    for output in copy, tmp_path / "link.mcap":
+        assert "is the recording itself" in rrgate("export", copy, "--csv", "--member", "state", "-o", output, code=2)
+    assert copy.read_bytes() == of_create.read_bytes()
 
 
 def test_a_member_is_exported_as_json(of_create, tmp_path):
