@@ -52,6 +52,19 @@ test("a held button drives, letting go anywhere stops", async ({ page }) => {
   await waitUntilStopped(page);
 });
 
+test("a held button is let go of with the left button of the mouse, also while another one is down", async ({
+  page,
+}) => {
+  const start = await poseOf(page);
+  await page.getByRole("button", { name: "Forward" }).hover();
+  await page.mouse.down();
+  await waitUntilMoved(page, start, 0.1);
+  await page.mouse.down({ button: "right" });
+  await page.mouse.up();
+  await waitUntilStopped(page);
+  await page.mouse.up({ button: "right" });
+});
+
 const endsOfAHeldKey: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
   "the window loses the keyboard": (page) => page.evaluate(() => window.dispatchEvent(new Event("blur"))),
   "the page is hidden": (page) =>
@@ -60,6 +73,7 @@ const endsOfAHeldKey: Readonly<Record<string, (page: Page) => Promise<unknown>>>
       document.dispatchEvent(new Event("visibilitychange"));
     }),
   "the page is left": (page) => page.evaluate(() => window.dispatchEvent(new Event("pagehide"))),
+  "the browser shows its menu": (page) => page.getByText("Hold a button, an arrow key").click({ button: "right" }),
   "a field takes the keyboard": (page) => page.getByRole("slider", { name: "Speed" }).focus(),
   "a shortcut begins": (page) => page.keyboard.down("Control"),
   "Escape is pressed": (page) => page.keyboard.press("Escape"),

@@ -2,7 +2,7 @@
 // Layer: web/panels.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { onStop } from "../robot/control";
+import { isLeftUp, onLetGo } from "../robot/let_go";
 import { explain } from "../robot/remote";
 import { HeldJog } from "./held_jog";
 import type { JogMeans } from "./held_jog";
@@ -34,15 +34,9 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
     if (!enabled) hold.end();
   }, [enabled, hold]);
   useEffect(() => {
-    const forget = onStop(letGo);
-    window.addEventListener("blur", letGo);
-    window.addEventListener("pagehide", letGo);
-    document.addEventListener("visibilitychange", letGo);
+    const forget = onLetGo(letGo);
     return () => {
       forget();
-      window.removeEventListener("blur", letGo);
-      window.removeEventListener("pagehide", letGo);
-      document.removeEventListener("visibilitychange", letGo);
       letGo();
     };
   }, [hold]);
@@ -58,6 +52,7 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
         event.currentTarget.setPointerCapture(event.pointerId);
         hold.begin();
       }}
+      onPointerMove={(event) => isLeftUp(event) && letGo()}
       onLostPointerCapture={letGo}
       onContextMenu={(event) => event.preventDefault()}
       onKeyDown={(event) => {

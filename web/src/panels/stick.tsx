@@ -2,6 +2,7 @@
 // Layer: web/panels.
 
 import { useRef } from "preact/hooks";
+import { isLeftUp } from "../robot/let_go";
 
 export interface StickMoves {
   /** A finger or a button of the mouse is down on it. */
@@ -25,6 +26,10 @@ export function StickPad({ label, x, y, press, move, release }: StickProps) {
     const at = (offset: number, size: number): number => Math.min(1, Math.max(-1, (2 * offset) / size - 1));
     move(at(event.clientX - box.left, box.width), -at(event.clientY - box.top, box.height));
   };
+  const letGo = (): void => {
+    held.current = null;
+    release();
+  };
   return (
     <div
       class="stick"
@@ -37,11 +42,8 @@ export function StickPad({ label, x, y, press, move, release }: StickProps) {
         press();
         follow(event);
       }}
-      onPointerMove={follow}
-      onLostPointerCapture={() => {
-        held.current = null;
-        release();
-      }}
+      onPointerMove={(event) => (isLeftUp(event) ? letGo() : follow(event))}
+      onLostPointerCapture={letGo}
       onContextMenu={(event) => event.preventDefault()}
     >
       <span class="stick-knob" style={{ left: `${50 + 50 * x}%`, top: `${50 - 50 * y}%` }} aria-hidden="true" />

@@ -3,8 +3,9 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { onStop, stopNow } from "../robot/control";
+import { stopNow } from "../robot/control";
 import { Driver } from "../robot/driver";
+import { onLetGo } from "../robot/let_go";
 import { explain } from "../robot/remote";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
@@ -216,21 +217,14 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
     if (!enabled) actions.letGo();
   }, [enabled, actions]);
   useEffect(() => {
-    const hidden = (): void => void (document.hidden && actions.letGo());
     let frame = requestAnimationFrame(function look() {
       actions.poll();
       frame = requestAnimationFrame(look);
     });
-    const forget = onStop(actions.letGo);
-    window.addEventListener("blur", actions.letGo);
-    window.addEventListener("pagehide", actions.letGo);
-    document.addEventListener("visibilitychange", hidden);
+    const forget = onLetGo(actions.letGo);
     return () => {
       cancelAnimationFrame(frame);
       forget();
-      window.removeEventListener("blur", actions.letGo);
-      window.removeEventListener("pagehide", actions.letGo);
-      document.removeEventListener("visibilitychange", hidden);
       actions.letGo();
     };
   }, [actions]);

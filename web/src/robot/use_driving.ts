@@ -2,8 +2,9 @@
 // Layer: web/robot.
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
-import { isEscape, onStop } from "./control";
+import { isEscape } from "./control";
 import { Holds } from "./holds";
+import { onLetGo } from "./let_go";
 import { commandFor, directionOfKey } from "./steering";
 import type { Direction, DriveCommand } from "./steering";
 import type { Driver } from "./driver";
@@ -66,12 +67,8 @@ export function useDriving(
       stop();
     };
     window.addEventListener("keydown", escape);
-    const forget = onStop(letGo);
-    return () => {
-      window.removeEventListener("keydown", escape);
-      forget();
-    };
-  }, [letGo, stop]);
+    return () => window.removeEventListener("keydown", escape);
+  }, [stop]);
 
   useEffect(() => {
     if (!shown) return;
@@ -92,20 +89,16 @@ export function useDriving(
         letGo(); // macOS tells no key-up of keys that were held with it
       else if (directionOfKey(event.code)) release(event.code);
     };
-    const hidden = (): void => {
-      if (document.hidden) letGo();
-    };
     const listeners = [
       [window, "keydown", keyDown],
       [window, "keyup", keyUp],
-      [window, "blur", letGo],
-      [window, "pagehide", letGo],
-      [document, "visibilitychange", hidden],
       [document, "focusin", (event: FocusEvent) => takesKeys(event.target) && letGo()],
     ] as const;
     for (const [target, name, heard] of listeners) target.addEventListener(name, heard as EventListener);
+    const forget = onLetGo(letGo);
     return () => {
       for (const [target, name, heard] of listeners) target.removeEventListener(name, heard as EventListener);
+      forget();
       letGo();
     };
   }, [shown, press, release, letGo, stop]);

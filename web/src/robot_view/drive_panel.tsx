@@ -5,6 +5,7 @@ import { useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { Control } from "../robot/control";
 import type { Driver } from "../robot/driver";
+import { isLeftUp } from "../robot/let_go";
 import { SPEED_MAX, SPEED_MIN } from "../robot/steering";
 import type { Direction, DriveCommand } from "../robot/steering";
 import { useDriving } from "../robot/use_driving";
@@ -111,6 +112,7 @@ function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
         event.currentTarget.setPointerCapture(event.pointerId); // the finger may slide off; letting go is still heard
         driving.press(source(event), direction);
       }}
+      onPointerMove={(event) => isLeftUp(event) && driving.release(source(event))}
       onLostPointerCapture={(event) => driving.release(source(event))} // after pointerup and pointercancel alike
       onContextMenu={(event) => event.preventDefault()} // a long touch is driving, not a menu
       onKeyDown={(event) => {
