@@ -148,6 +148,64 @@ describe("driver", () => {
     await Promise.resolve();
     expect(calls.map((c) => c.command)).toEqual([GO, STOP, TURN]);
   });
+  it("stops once the right to move was given back, and moves by a new wish alone", async () => {
+    const { calls, send } = connection();
+    const driver = makeDriver();
+    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    driver.setConnection({ send, right });
+    driver.want(GO);
+    await calls[0]?.answer();
+    right.mayCommand = false;
+    vi.advanceTimersByTime(500);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
+    await calls[1]?.answer();
+    vi.advanceTimersByTime(2_000);
+    expect([calls.length, right.begin.mock.calls.length]).toEqual([2, 0]);
+    driver.want(GO);
+    await Promise.resolve();
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, GO]);
+  });
+  it("drops a wish that waited for an answer while the right to move was given back", async () => {
+    const { calls, send } = connection();
+    const driver = makeDriver();
+    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    driver.setConnection({ send, right });
+    driver.want(GO);
+    driver.want(TURN);
+    right.mayCommand = false;
+    await calls[0]?.answer();
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
+    expect(right.begin).not.toHaveBeenCalled();
+  });
+  it.each(["answered", "lost"])(
+    "sends no wish while the right to it is asked for, where a stop was %s",
+    async (stop) => {
+      const { calls, send } = connection();
+      const driver = makeDriver();
+      let give: () => void = () => undefined;
+      const right = { mayCommand: true, begin: () => new Promise<void>((resolve) => (give = resolve)) };
+      driver.setConnection({ send, right });
+      driver.want(GO);
+      await calls[0]?.answer();
+      driver.stop();
+      right.mayCommand = false;
+      if (stop === "answered") {
+        driver.want(TURN);
+        await calls[1]?.answer();
+      } else {
+        await calls[1]?.fail(new Error("no answer"));
+        driver.want(TURN);
+      }
+      vi.advanceTimersByTime(500);
+      const stops = stop === "answered" ? [STOP] : [STOP, STOP];
+      expect(calls.map((c) => c.command)).toEqual([GO, ...stops]);
+      await calls[2]?.answer();
+      right.mayCommand = true;
+      give();
+      await Promise.resolve();
+      expect(calls.map((c) => c.command)).toEqual([GO, ...stops, TURN]);
+    },
+  );
   it("sends a stop at once, past a command that is never answered", () => {
     const { calls, send } = connection();
     const driver = makeDriver();

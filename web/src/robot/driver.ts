@@ -122,12 +122,18 @@ export class Driver<Command> {
     this.#sent = command;
     this.#unanswered[isStop ? "stops" : "moves"] += 1;
     if (!isStop) this.#mayMove = true; // it may, even if the answer never comes
-    const again = (): void => void (this.#isAnswered && this.#transmit(this.#wanted));
-    this.#repeat ??= setInterval(again, this.#options.repeatMs ?? REPEAT_MS);
+    this.#repeat ??= setInterval(() => this.#again(), this.#options.repeatMs ?? REPEAT_MS);
     means.send(command, this.#insists).then(
       () => this.#settle(means, isStop, null),
       (error: unknown) => this.#settle(means, isStop, error),
     );
+  }
+
+  #again(): void {
+    if (!this.#isAnswered) return;
+    if (this.#isStop(this.#wanted) || this.#means?.right?.mayCommand !== false) return this.#transmit(this.#wanted);
+    if (!this.#isStop(this.#sent)) this.want(this.#options.rest);
+    else if (this.#mayMove) this.#transmit(this.#options.rest); // the right to what is wanted is being asked for
   }
 
   #settle(means: Means<Command>, isStop: boolean, error: unknown): void {
@@ -146,7 +152,8 @@ export class Driver<Command> {
     if (this.#isStop(this.#wanted) && !this.#mayMove) this.#rest();
     else if (!this.#options.same(this.#sent, this.#wanted))
       if (this.#isStop(this.#wanted)) this.#transmit(this.#wanted);
-      else this.#move();
+      else if (this.#isStop(this.#sent) || means.right?.mayCommand !== false) this.#move();
+      else this.want(this.#options.rest); // wanted before the right was given back
   }
 }
 
