@@ -111,6 +111,9 @@ describe("agents", () => {
     session.fetch.mockResolvedValueOnce(answer(503, { detail: "starting" }));
     await desk.look();
     expect(desk.silence.value?.reason).toBe("starting");
+    session.fetch.mockResolvedValueOnce(answer(429, { detail: "too many requests" }));
+    expect(await desk.look()).toBe(true);
+    expect(desk.silence.value?.reason).toBe("too many requests");
     expect(desk.state.value).toBe(known);
     session.fetch.mockResolvedValueOnce(answer(200, {}));
     await desk.look();

@@ -73,7 +73,8 @@ export class AgentsDesk {
     try {
       const signal = AbortSignal.timeout(TIMEOUT_MS);
       const response = await this.#session.fetch(`${PATH}/approvals`, { signal });
-      if (response.status >= 500) throw new Error(await problemOf(response));
+      // It does not say that there are none: it is broken, or asked too often.
+      if (response.status >= 500 || response.status === 429) throw new Error(await problemOf(response));
       const answer: unknown = response.ok ? await response.json() : null;
       if (asked !== this.#asked) return true; // asked again meanwhile, or stopped
       this.#heardAt = Date.now();
