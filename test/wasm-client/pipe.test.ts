@@ -126,6 +126,23 @@ it("waits for acknowledgements where they are wanted", async () => {
   expect((await openOnes).code).toBe(ErrorCode.InvalidOperation);
 });
 
+it("waits for nothing any more where an acknowledgement does not come in time", async () => {
+  const endpoint = await open("echo");
+  service.isMute = true;
+  const added = vi.spyOn(AbortSignal.prototype, "addEventListener");
+  const removed = vi.spyOn(AbortSignal.prototype, "removeEventListener");
+  vi.useFakeTimers();
+  const late = failure(endpoint.send(1, { ack: true, timeout: 100 }));
+  await settle();
+  await vi.advanceTimersByTimeAsync(100);
+  expect((await late).code).toBe(ErrorCode.RequestTimeout);
+  vi.useRealTimers();
+  await settle();
+  expect(added.mock.calls.length).toBeGreaterThan(0);
+  expect(removed).toHaveBeenCalledTimes(added.mock.calls.length);
+  vi.restoreAllMocks();
+});
+
 it("refuses what is not a packet of the pipe", async () => {
   const endpoint = await open("echo");
   expect((await failure(endpoint.send("text"))).code).toBe(ErrorCode.DataTypeMismatch);

@@ -142,9 +142,10 @@ class Endpoint implements PipeEndpoint {
     const taken = acknowledged ?? session.room();
     if (!taken) return;
     const unlessOver = within(taken, { signal: this.#ending.signal }, "");
-    await within(unlessOver, limits, `pipe ${info.name}: the packet was not taken`).finally(() =>
-      this.#acks.delete(number),
-    );
+    await within(unlessOver, limits, `pipe ${info.name}: the packet was not taken`).finally(() => {
+      this.#acks.get(number)?.(); // nobody waits for it any more, nor for the endpoint's end
+      this.#acks.delete(number);
+    });
   }
 
   losses(options?: CallOptions): Promise<Losses | undefined> {
