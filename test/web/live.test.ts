@@ -4,6 +4,7 @@ import { follow } from "../../web/src/gateway/link_to";
 import { DeviceList } from "../../web/src/gateway/devices";
 import { definitionsOf } from "../../web/src/live/definitions";
 import { Feed } from "../../web/src/live/feed";
+import { pause } from "../../web/src/live/pause";
 import { Pulse } from "../../web/src/live/pulse";
 
 beforeEach(() => void vi.useFakeTimers());
@@ -50,6 +51,28 @@ describe("a pulse", () => {
       await settle();
     }
     expect(ask).toHaveBeenCalledTimes(3);
+  });
+});
+
+describe("a pause", () => {
+  it("ends with its time or with its signal, and leaves nothing at the signal", async () => {
+    const stop = new AbortController();
+    const added = vi.spyOn(stop.signal, "addEventListener");
+    const removed = vi.spyOn(stop.signal, "removeEventListener");
+    const ended = vi.fn();
+    void pause(100, stop.signal).then(ended);
+    await vi.advanceTimersByTimeAsync(99);
+    expect(ended).not.toHaveBeenCalled();
+    await vi.advanceTimersByTimeAsync(1);
+    expect(ended).toHaveBeenCalledTimes(1);
+    expect(removed.mock.calls.map(([name, heard]) => [name, heard])).toEqual(
+      added.mock.calls.map(([name, heard]) => [name, heard]),
+    );
+    const early = pause(100_000, stop.signal);
+    stop.abort();
+    await early;
+    await pause(100_000, stop.signal); // has ended already
+    expect(vi.getTimerCount()).toBe(0);
   });
 });
 

@@ -4,6 +4,7 @@
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { Pace } from "./pace";
+import { pause } from "./pause";
 
 export type FeedKind = "wire" | "pipe" | "property" | "event";
 
@@ -89,14 +90,6 @@ export class Feed {
     this.pace.hear(now);
     for (const heard of this.heard) heard(value, now, isAfterGap);
   }
-}
-
-/** Ends early where `signal` is given. */
-function pause(ms: number, signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const timer = setTimeout(resolve, ms);
-    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
-  });
 }
 
 const feeds = new Map<Remote, Map<string, { feed: Feed; users: number }>>();

@@ -3,6 +3,7 @@
 
 import { Store } from "../app/store";
 import { Pace } from "../live/pace";
+import { pause } from "../live/pause";
 import { Reckoner } from "./reckoning";
 import type { Pose } from "./reckoning";
 import { explain } from "./remote";
@@ -246,11 +247,4 @@ export class RobotModel {
 
 export function sideOf(bits: number): string {
   return ["", "right", "left", "both sides"][bits & 3] ?? "";
-}
-
-function pause(ms: number, signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const timer = setTimeout(resolve, ms);
-    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
-  });
 }
