@@ -66,6 +66,13 @@ test("its tool is jogged along an axis of the robot's frame while a button is he
     last = now;
     expect(isStill).toBe(true);
   }).toPass({ intervals: [300] });
+  await forward.hover();
+  await page.mouse.down();
+  await expect(forward).toHaveAttribute("aria-pressed", "true");
+  await page.mouse.down({ button: "right" });
+  await page.mouse.up();
+  await expect(forward).toHaveAttribute("aria-pressed", "false"); // the right button is still down
+  await page.mouse.up({ button: "right" });
   await page.getByRole("button", { name: "Halt", exact: true }).click();
   await expect(forward).toBeDisabled();
 });
