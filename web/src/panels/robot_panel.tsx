@@ -1,16 +1,17 @@
 // A standard robot: what its flags say, where its joints and tools are, and jogging them while a button is held.
 // Layer: web/panels. Source: com.robotraconteur.robotics.robot.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
-import { stopNow, tellStop, watchStop } from "../robot/control";
+import { stopNow, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import { ROBOT_STOP, stopDevice } from "../robot/stop";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
+import { CommandMode } from "./command_mode";
 import { jointsOf, modeName, readState, stateWords } from "./joints";
 import type { Joint } from "./joints";
 import { JogRow } from "./jog_row";
@@ -34,6 +35,8 @@ export default function RobotPanel(props: PanelProps) {
   const [halted, setHalted] = useState<string | null>(null);
   const acting = useAction();
   const { control, last, isOpen } = useControl(object);
+  const changing = useMemo(() => new CommandMode(), []);
+  useEffect(() => () => changing.leave(), [object, changing]);
   const percent = numberIn(settings, "percent", 10, 0, 100);
   useEffect(() => {
     if (!object || !isRobot) return;
@@ -51,14 +54,7 @@ export default function RobotPanel(props: PanelProps) {
   if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
 
   const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
-  const beginJog = (): void =>
-    acting.run(async () => {
-      const isStopped = watchStop();
-      await control?.begin();
-      if (isStopped()) return;
-      await object?.set("command_mode", 0); // a robot changes its mode only from halt
-      if (!isStopped()) await object?.set("command_mode", 1);
-    });
+  const beginJog = (): void => acting.run(async () => void (object && (await changing.change(object, control, 1))));
   const haltAll = (): void => {
     setFailure(null);
     setHalted(null);

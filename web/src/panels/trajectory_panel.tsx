@@ -6,11 +6,12 @@ import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
-import { onStop, watchStop } from "../robot/control";
+import { onStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { enumName } from "../values/definitions";
+import { CommandMode } from "./command_mode";
 import { GeneratorRun } from "./generator_run";
 import { jointsOf, readState } from "./joints";
 import type { Joint } from "./joints";
@@ -38,7 +39,14 @@ export default function TrajectoryPanel(props: PanelProps) {
   const run = useMemo(() => new GeneratorRun((status) => setSaid(troubleIn(status, props))), []);
   const running = useStore(run.state);
   const failure = useStore(run.failure);
-  useEffect(() => () => run.leave(), [object, run]);
+  const mode = useMemo(() => new CommandMode(), []);
+  useEffect(
+    () => () => {
+      mode.leave();
+      run.leave();
+    },
+    [object, mode, run],
+  );
   useEffect(() => onStop(() => void run.stop()), [run]);
   useEffect(() => {
     if (!object || !canRun) return;
@@ -64,13 +72,8 @@ export default function TrajectoryPanel(props: PanelProps) {
       setSaid(null);
       if (!object) throw new Error(t("not connected"));
       trajectoryThrough(here.current, waypoints, joints); // what is wrong with it is said before anything is commanded
-      const isStopped = watchStop();
-      await control?.begin();
-      if (isStopped()) return;
-      await object.set("command_mode", 0); // a robot changes its mode only from halt
-      if (isStopped()) return;
-      await object.set("command_mode", definitions.enum("RobotCommandMode", scope)?.values.get("trajectory") ?? 2);
-      if (isStopped()) return;
+      const wanted = definitions.enum("RobotCommandMode", scope)?.values.get("trajectory") ?? 2;
+      if (!(await mode.change(object, control, wanted))) return;
       const trajectory = trajectoryThrough(here.current, waypoints, joints);
       void run.go(
         true,
