@@ -12,6 +12,7 @@ import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { drawFrame } from "./draw_frame";
+import { newestOf } from "./newest";
 import { Snapshot } from "./snapshot";
 import { useAge } from "../ui/use_age";
 import { clockTime } from "../ui/words";
@@ -185,6 +186,7 @@ function useFrames(
         if (stop.signal.aborted) return;
         drawnAt.current = performance.now();
         setFrames((old) => (old.failure === null && old.size === size ? old : { failure: null, hasFrame: true, size }));
+        await new Promise(requestAnimationFrame); // what has come while it was drawn is taken first
       }
     };
     const keepFollowing = async (): Promise<void> => {
@@ -205,7 +207,7 @@ async function* framesOf(camera: Remote, signal: AbortSignal): AsyncGenerator<un
   if (camera.has("FrameStream", "pipe")) {
     const stream = camera.pipe("FrameStream", signal);
     await camera.call("StartStreaming", []);
-    yield* stream;
+    yield* newestOf(stream);
     return;
   }
   while (!signal.aborted) {
