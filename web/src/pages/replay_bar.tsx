@@ -1,7 +1,7 @@
 // The time line of a device that is a replay: where it is, play and pause, speed, and going to another time.
 // Layer: web/pages. Source: robdef/org.rrgate.replay.robdef.
 
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
@@ -37,11 +37,12 @@ function Bar({ link, from, list }: { link: Link; from: string; list: DeviceList 
   const look = useFeed(object, "wire", "state");
   const action = useAction();
   const [held, setHeld] = useState<number | null>(null); // by the slider, until the replay is there
+  useEffect(() => setHeld(null), [object]); // Firefox tells no end of a drag whose slider was switched off meanwhile
   const state = readState(look.value);
   if (!state) return <Failure text={failure ?? look.failure} />;
   const { isPlaying, duration, speed, loops } = state;
-  const position = held ?? state.position;
   const isOff = object === null;
+  const position = (isOff ? null : held) ?? state.position;
   const call = (name: string, ...args: unknown[]): void =>
     action.run(async () => void (await object?.call(name, args)));
   const set = (name: string, value: unknown): void => action.run(async () => void (await object?.set(name, value)));
