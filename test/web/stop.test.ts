@@ -116,6 +116,7 @@ describe("a jog", () => {
     const answers: (() => void)[] = [];
     const means = {
       jog: vi.fn((_: () => boolean) => new Promise<void>((resolve) => answers.push(resolve))),
+      mayGoOn: vi.fn(() => true),
       stop: vi.fn(() => Promise.resolve()),
       fail: vi.fn(),
       done: vi.fn(),
@@ -148,6 +149,20 @@ describe("a jog", () => {
     answers[0]?.();
     await vi.advanceTimersByTimeAsync(0);
     expect(means.stop).toHaveBeenCalledTimes(2);
+  });
+
+  it("ends where the right that it has taken at its beginning is gone", async () => {
+    const { means, hold, answers } = setup();
+    means.mayGoOn.mockReturnValue(false);
+    hold.begin();
+    answers[0]?.();
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(means.jog).toHaveBeenCalledOnce();
+    expect(means.changed.mock.calls).toEqual([[true], [false]]);
+    expect(means.stop).toHaveBeenCalled();
+    hold.begin();
+    expect(means.jog).toHaveBeenCalledTimes(2);
+    hold.end();
   });
 
   it("that failed is not held any more", async () => {

@@ -6,6 +6,8 @@ const REPEAT_MS = 100;
 export interface JogMeans {
   /** Moves for a moment. `isHeld`: whether it is still wanted, after a wait. */
   jog: (isHeld: () => boolean) => Promise<unknown>;
+  /** Whether the right to move, which the first moment takes, is still there. */
+  mayGoOn: () => boolean;
   stop: () => Promise<unknown>;
   fail: (error: unknown) => void;
   /** What was sent arrived. */
@@ -15,7 +17,7 @@ export interface JogMeans {
 
 export class HeldJog {
   readonly #means: JogMeans;
-  #run: { timer: ReturnType<typeof setInterval> } | null = null;
+  #run: { timer: ReturnType<typeof setInterval>; hasMoved: boolean } | null = null;
   #isWaiting = false;
 
   constructor(means: JogMeans) {
@@ -24,7 +26,7 @@ export class HeldJog {
 
   begin(): void {
     if (this.#run) return;
-    this.#run = { timer: setInterval(() => this.#send(), REPEAT_MS) };
+    this.#run = { timer: setInterval(() => this.#send(), REPEAT_MS), hasMoved: false };
     this.#means.changed(true);
     this.#send();
   }
@@ -40,12 +42,17 @@ export class HeldJog {
   #send(): void {
     if (this.#isWaiting) return; // no queue of commands that are old when they are carried out
     const mine = this.#run;
+    if (mine?.hasMoved && !this.#means.mayGoOn()) return this.end();
     const isHeld = (): boolean => mine !== null && this.#run === mine;
     this.#isWaiting = true;
     this.#means
       .jog(isHeld)
       .then(
-        () => isHeld() && this.#means.done(),
+        () => {
+          if (!mine || !isHeld()) return;
+          mine.hasMoved = true;
+          this.#means.done();
+        },
         (error: unknown) => (this.#means.fail(error), isHeld() && this.end()),
       )
       .finally(() => {

@@ -7,21 +7,22 @@ import { explain } from "../robot/remote";
 import { HeldJog } from "./held_jog";
 import type { JogMeans } from "./held_jog";
 
-export interface JogButtonProps extends Pick<JogMeans, "jog" | "stop"> {
+export interface JogButtonProps extends Pick<JogMeans, "jog" | "mayGoOn" | "stop"> {
   label: string;
   sign: string;
   enabled: boolean;
   fail: (text: string | null) => void;
 }
 
-export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonProps) {
+export function JogButton({ label, sign, enabled, jog, mayGoOn, stop, fail }: JogButtonProps) {
   const [held, setHeld] = useState(false);
-  const latest = useRef({ jog, stop, fail });
-  latest.current = { jog, stop, fail };
+  const latest = useRef({ jog, mayGoOn, stop, fail });
+  latest.current = { jog, mayGoOn, stop, fail };
   const hold = useMemo(
     () =>
       new HeldJog({
         jog: (isHeld) => latest.current.jog(isHeld),
+        mayGoOn: () => latest.current.mayGoOn(),
         stop: () => latest.current.stop(),
         fail: (error) => latest.current.fail(explain(error)),
         done: () => latest.current.fail(null),

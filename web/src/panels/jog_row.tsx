@@ -14,6 +14,8 @@ export interface JogRowProps {
   enabled: boolean;
   /** `direction`: 1 or -1. */
   jog: (direction: number, isHeld: () => boolean) => Promise<unknown>;
+  /** Whether a movement that has begun may go on. */
+  mayGoOn: () => boolean;
   stop: () => Promise<unknown>;
   fail: (text: string | null) => void;
   /** Between the buttons. */
@@ -21,7 +23,7 @@ export interface JogRowProps {
 }
 
 export function JogRow(props: JogRowProps) {
-  const { name, value, unit, digits, isJogged = true, enabled, jog, stop, fail, children } = props;
+  const { name, value, unit, digits, isJogged = true, enabled, jog, mayGoOn, stop, fail, children } = props;
   const button = (label: string, sign: string, direction: number) =>
     isJogged && (
       <JogButton
@@ -29,6 +31,7 @@ export function JogRow(props: JogRowProps) {
         sign={sign}
         enabled={enabled}
         jog={(isHeld) => jog(direction, isHeld)}
+        mayGoOn={mayGoOn}
         stop={stop}
         fail={fail}
       />

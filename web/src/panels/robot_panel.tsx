@@ -86,6 +86,7 @@ export default function RobotPanel(props: PanelProps) {
     await control?.begin();
     if (isHeld()) await jog("call", (direction * percent) / 100);
   };
+  const mayGoOn = (): boolean => control?.mayCommand !== false; // a hand that still holds a button takes nothing back
   const halt = (jog: Jog): Promise<unknown> =>
     reach ? stopNow(reach, false, () => jog("urgent", 0)) : Promise.resolve();
   const canJog = object !== null && isOpen && mode === "jog" && look.stale === null;
@@ -147,6 +148,7 @@ export default function RobotPanel(props: PanelProps) {
                 digits={4}
                 enabled={canJog}
                 jog={(direction, isHeld) => jogBy(jog, direction, isHeld)}
+                mayGoOn={mayGoOn}
                 stop={() => halt(jog)}
                 fail={setFailure}
               >
@@ -176,6 +178,7 @@ export default function RobotPanel(props: PanelProps) {
                           isJogged={tool.isJogged}
                           enabled={canJog}
                           jog={(direction, isHeld) => jogBy(jog, direction, isHeld)}
+                          mayGoOn={mayGoOn}
                           stop={() => halt(jog)}
                           fail={setFailure}
                         />
