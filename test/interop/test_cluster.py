@@ -1,10 +1,12 @@
 """Three gateways behind a proxy with the configurations of gateway-config/cluster/: each device has one of them."""
+import contextlib
 import json
 import re
 import signal
 import sys
 
 import pytest
+from websockets.sync.client import connect
 
 from clients import run_and_check
 from directions import PEERS
@@ -113,6 +115,26 @@ def test_each_device_has_one_gateway(cluster):
     assert len(set(by_http.values())) > 1
     assert len(json.loads(fetch(cluster.proxy.root, "/api/v1/devices")[2])["devices"]) == len(DEVICES)
     assert fetch(cluster.proxy.root, "/metrics")[0] == 403
+
+
+@pytest.mark.parametrize("proxy", list(PROXIES))
+def test_a_page_is_a_device_of_the_gateway_that_its_clients_come_to(proxy, device_url, tmp_path):
+    cluster = Cluster(proxy, device_url, tmp_path, serve={}, timeouts={"connect_ms": 60000})
+    pages = [f"page{number}" for number in range(8)]
+    try:
+        with contextlib.ExitStack() as open_pages:
+            for name in pages:
+                assert fetch(cluster.proxy.root, f"/api/v1/devices/{name}/Phone")[0] == 404
+                url = f"ws://127.0.0.1:{cluster.proxy.root}/serve/{name}"
+                page = open_pages.enter_context(connect(url, subprotocols=["rrgate.serve.v1"]))
+                while json.loads(page.recv(10)) != {"served": name}:  # it is asked for connections too
+                    pass
+            for number in range(2, 5):  # 503: the page opens no connection
+                found = {name: fetch(cluster.proxy.root, f"/api/v1/devices/{name}/Phone", address=f"127.0.0.{number}")[0]
+                         for name in pages}
+                assert found == dict.fromkeys(pages, 503)
+    finally:
+        cluster.stop()
 
 
 def test_a_gateway_dies(cluster, tmp_path):
