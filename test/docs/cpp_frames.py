@@ -31,6 +31,7 @@ FRAMES = {
          "struct { void on_settled(std::function<void(double)>) {} } scale;\n"
          "void slow(const std::shared_ptr<rr::Service>& service) {\n", "}\n"),
     ("docs/device-author.md", "const auto bumped"): ("void waits(RobotClient robot) {\n", "}\n"),
+    ("docs/device-author.md", "rr::SecurityPolicy policy"): ("void has_users(const std::shared_ptr<rr::Service>& service) {\n", "}\n"),
     ("docs/device-author.md", "node.accept"):
         ("void hands_over(rr::Node& node, boost::beast::websocket::stream<boost::beast::tcp_stream> websocket) {\n", "}\n"),
     ("docs/discovery.md", "rr::Node node"): ("void announces(const std::shared_ptr<rr::Service>& service) {\n", "}\n"),
