@@ -18,7 +18,7 @@ import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
 import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
-import { draftOf, formatUuid, jsonOf, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
+import { draftOf, formatUuid, freeKey, jsonOf, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
 import { numberPaths, numberReader } from "../../web/src/values/paths";
 import { rowsOf } from "../../web/src/values/rows";
 import { unitOf } from "../../web/src/values/units";
@@ -130,6 +130,68 @@ describe("drafts", () => {
     expect(fitted.emptied).toEqual(["mode"]); // in the others nothing was typed, or nothing is lost
     const renamed = [{ name: "speed", type: "single" }];
     expect(fitDrafts(kept, renamed, definitions, scope)).toMatchObject({ drafts: [typed("0")], emptied: ["speed"] });
+  });
+
+  const read = (value: unknown, type: string) => draftOf(value, type, definitions, scope);
+  const written = (draft: ReturnType<typeof read>, type: string) => valueOf(draft, type, definitions, scope);
+  const edited = (value: unknown, text: string, type = "varvalue") =>
+    written({ ...read(value, type), text } as never, type);
+
+  test("that nobody has changed are written as they were read", () => {
+    for (const value of [
+      Float64Array.of(1),
+      Float32Array.of(1.5, -2),
+      BigInt64Array.of(9007199254740993n),
+      new Uint8Array(0),
+      "12",
+      "",
+      null,
+      { x: 1 },
+      new Map([[1, "a"]]),
+      [Int16Array.of(1), "a"],
+    ])
+      expect(written(read(value, "varvalue"), "varvalue")).toBe(value);
+    for (const [type, value] of [
+      ["cdouble", { re: 1, im: -2 }],
+      ["cdouble[]", { re: Float64Array.of(1), im: Float64Array.of(-2) }],
+      ["double[*]", { dims: [1, 1], data: Float64Array.of(3) }],
+      ["string{list}", null],
+      ["double{int32}", null],
+    ] as const)
+      expect(written(read(value, type), type), type).toBe(value);
+    expect(written(read(null, "Arm"), "Arm")).toBeNull();
+    const map = read(new Map<string, unknown>([["a", Float64Array.of(1)]]), "varvalue{string}");
+    expect(written(map, "varvalue{string}")).toEqual(new Map([["a", Float64Array.of(1)]]));
+  });
+
+  test("of a varvalue stay numbers or text of the type that was read", () => {
+    expect(edited(Float64Array.of(1), "12")).toEqual(Float64Array.of(12));
+    expect(edited(Float32Array.of(1.5), "[2.5, 3]")).toEqual(Float32Array.of(2.5, 3));
+    expect(edited(BigUint64Array.of(1n), "18446744073709551615")).toEqual(BigUint64Array.of(2n ** 64n - 1n));
+    expect(() => edited(Uint8Array.of(1), "256")).toThrow("element 0: 256 is out of range; expected uint8, 0 to 255");
+    expect(edited("on", "12")).toBe("12");
+    expect(edited("on", "")).toBe("");
+    expect(edited(null, "12")).toBe(12);
+    expect(edited({ x: 1 }, '{"x": 2}')).toEqual({ x: 2 });
+    expect(edited({ re: 1, im: -2 }, "[3, 4]", "cdouble")).toEqual({ re: 3, im: 4 });
+    expect(written({ kind: "list", items: [] }, "string{list}")).toEqual([]);
+  });
+
+  test("of a map have each key once", () => {
+    const entry = (key: string) => ({ key, value: { kind: "text", text: "1" } as const });
+    expect(freeKey([entry("1"), entry("0"), entry(" 0x2")], "int32")).toBe("3");
+    expect(freeKey([entry("key2"), entry("x")], "string")).toBe("key1");
+    expect(freeKey([entry("key1"), entry("key2")], "string")).toBe("key3");
+    const twice = { kind: "map" as const, entries: [entry("2"), entry("0x2")] };
+    expect(written({ kind: "map", entries: twice.entries }, "double{string}")).toEqual(
+      new Map([
+        ["2", 1],
+        ["0x2", 1],
+      ]),
+    );
+    expect(() => written(twice, "double{int32}")).toThrow('key "0x2" stands twice');
+    twice.entries[1] = entry("2");
+    expect(() => written(twice, "double{string}")).toThrow('key "2" stands twice');
   });
 
   test("say which field is wrong", () => {

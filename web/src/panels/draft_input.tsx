@@ -4,7 +4,7 @@
 import { useId } from "preact/hooks";
 import { t } from "../app/language";
 import type { Definitions } from "../values/definitions";
-import { makeDraft, shapeOf } from "../values/draft";
+import { freeKey, makeDraft, shapeOf } from "../values/draft";
 import type { Draft, Shape } from "../values/draft";
 import { placeholder } from "../values/parse";
 import "./draft_input.css";
@@ -25,20 +25,20 @@ export function DraftInput(props: DraftInputProps) {
   if (shape.kind === "struct" && draft.kind === "struct") return <StructInput {...props} shape={shape} draft={draft} />;
   if (shape.kind === "list" && draft.kind === "list") return <ListInput {...props} shape={shape} draft={draft} />;
   if (shape.kind === "map" && draft.kind === "map") return <MapInput {...props} shape={shape} draft={draft} />;
-  return draft.kind === "text" ? <WordInput {...props} shape={shape} text={draft.text} /> : null;
+  return draft.kind === "text" ? <WordInput {...props} shape={shape} draft={draft} /> : null;
 }
 
 function WordInput({
   label,
   type,
   shape,
-  text,
+  draft,
   change,
   documentation,
-}: DraftInputProps & { shape: Shape; text: string }) {
+}: DraftInputProps & { shape: Shape; draft: Extract<Draft, { kind: "text" }> }) {
+  const { text } = draft;
   const id = useId();
-  const changed = (event: Event): void =>
-    change({ kind: "text", text: (event.currentTarget as HTMLInputElement).value });
+  const changed = (event: Event): void => change({ ...draft, text: (event.currentTarget as HTMLInputElement).value });
   const names = shape.kind === "enum" ? shape.names : shape.kind === "bool" ? ["false", "true"] : null;
   return (
     <div class="value-input" title={documentation || undefined}>
@@ -152,7 +152,7 @@ function MapInput({ label, type, definitions, scope, shape, draft, change }: Of<
       entries: [
         ...entries,
         {
-          key: shape.keys === "int32" ? String(entries.length) : `key${entries.length + 1}`,
+          key: freeKey(entries, shape.keys),
           value: makeDraft(shape.item, definitions, scope),
         },
       ],
@@ -171,7 +171,6 @@ function MapInput({ label, type, definitions, scope, shape, draft, change }: Of<
             scope={scope}
             shape={{ kind: "text", type: shape.keys }}
             draft={{ kind: "text", text: key }}
-            text={key}
             change={(next) => next.kind === "text" && set(i, { key: next.text })}
           />
           <DraftInput

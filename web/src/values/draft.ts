@@ -8,11 +8,13 @@ import { isComplex, isNumeric, parseType } from "./type_text";
 import type { TypeText } from "./type_text";
 
 export type Draft =
-  | { kind: "text"; text: string }
+  /** `was`: what the device had, where it was read; it may have what no text says. */
+  | { kind: "text"; text: string; was?: unknown }
   /** In the order of the definition; null where the whole struct is. */
   | { kind: "struct"; fields: Map<string, Draft> | null }
-  | { kind: "list"; items: Draft[] }
-  | { kind: "map"; entries: { key: string; value: Draft }[] };
+  /** `isNull`: there was none on the device; until something is added. */
+  | { kind: "list"; items: Draft[]; isNull?: true }
+  | { kind: "map"; entries: { key: string; value: Draft }[]; isNull?: true };
 
 /** What a type looks like to who types it in. */
 export type Shape =
@@ -98,19 +100,26 @@ export function valueOf(draft: Draft, type: string, definitions: Definitions, sc
     }
     return value;
   }
+  if ((draft.kind === "list" || draft.kind === "map") && draft.isNull) return null;
   if (shape.kind === "list" && draft.kind === "list")
     return draft.items.map((item, i) => at(`[${i}]`, () => valueOf(item, shape.item, definitions, scope)));
   if (shape.kind === "map" && draft.kind === "map") {
-    const entries = draft.entries.map(({ key, value }): [string | number, unknown] => [
-      shape.keys === "string" ? key : (at("key", () => parseInput(key, "int32")) as number),
-      at(key, () => valueOf(value, shape.item, definitions, scope)),
-    ]);
-    return new Map(entries);
+    const made = new Map<string | number, unknown>();
+    for (const { key: typed, value } of draft.entries) {
+      const key = shape.keys === "string" ? typed : (at("key", () => parseInput(typed, "int32")) as number);
+      if (made.has(key)) throw new Error(`key "${typed}" stands twice`);
+      made.set(
+        key,
+        at(typed, () => valueOf(value, shape.item, definitions, scope)),
+      );
+    }
+    return made;
   }
   if (draft.kind !== "text") throw new Error(`found a ${draft.kind}, expected ${type}`);
+  if (draft.was !== undefined && textOf(draft.was) === draft.text) return draft.was;
   if (shape.kind === "uuid") return { ["uuid_bytes"]: readUuid(draft.text) };
   if (shape.kind === "enum") return enumValue(draft.text, type, definitions, scope);
-  if (type === "varvalue") return draft.text.trim() === "" ? null : plainJson(draft.text);
+  if (type === "varvalue") return varvalueOf(draft.text, draft.was);
   return parseInput(draft.text, type);
 }
 
@@ -129,6 +138,7 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
     return {
       kind: "list",
       items: Array.isArray(value) ? value.map((item) => draftOf(item, shape.item, definitions, scope)) : [],
+      ...(value === null && { isNull: true }),
     };
   if (shape.kind === "map")
     return {
@@ -140,13 +150,21 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
               value: draftOf(item, shape.item, definitions, scope),
             }))
           : [],
+      ...(value === null && { isNull: true }),
     };
   if (shape.kind === "uuid") return { kind: "text", text: formatUuid(uuidBytes(value)) };
   if (shape.kind === "enum") {
     const found = definitions.enum(parseType(type).base, scope);
     return { kind: "text", text: (found && enumName(value, found)) ?? String(value) };
   }
-  return { kind: "text", text: textOf(value) };
+  return { kind: "text", text: textOf(value), was: value };
+}
+
+/** The first key that no entry of a map has. */
+export function freeKey(entries: readonly { key: string }[], keys: "int32" | "string"): string {
+  const taken = new Set(entries.map(({ key }) => (keys === "int32" ? String(Number(key)) : key)));
+  const [first, before] = keys === "int32" ? [0, ""] : [1, "key"];
+  for (let number = first; ; ++number) if (!taken.has(`${before}${number}`)) return `${before}${number}`;
 }
 
 /** As JSON of the gateway's HTTP API, for examples of code. 64-bit integers, and numbers that JSON has not, are texts there. */
@@ -198,7 +216,25 @@ export function formatUuid(bytes: unknown): string {
   return digits.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
-function plainJson(text: string): unknown {
+const ITEM_TYPES: Readonly<Record<string, string>> = {
+  Float64Array: "double",
+  Float32Array: "single",
+  Int8Array: "int8",
+  Uint8Array: "uint8",
+  Int16Array: "int16",
+  Uint16Array: "uint16",
+  Int32Array: "int32",
+  Uint32Array: "uint32",
+  BigInt64Array: "int64",
+  BigUint64Array: "uint64",
+};
+
+/** Numbers and texts stay of the type that the device had; else it is JSON, or a text. */
+function varvalueOf(text: string, was: unknown): unknown {
+  if (typeof was === "string") return text;
+  const items = ArrayBuffer.isView(was) ? ITEM_TYPES[was.constructor.name] : undefined;
+  if (items !== undefined) return parseInput(text, `${items}[]`);
+  if (text.trim() === "") return null;
   try {
     return JSON.parse(text);
   } catch {
