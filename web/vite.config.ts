@@ -27,6 +27,11 @@ export default defineConfig({
   },
   test: {
     dir: "../test/web",
+    // For tests of what is shown: they lie elsewhere, and the client brings a page without a browser.
+    alias: [
+      { find: /^happy-dom$/, replacement: `${import.meta.dirname}/../wasm-client/node_modules/happy-dom` },
+      { find: /^preact$/, replacement: `${import.meta.dirname}/node_modules/preact/dist/preact.mjs` },
+    ],
     include: ["**/*.test.ts"],
     globals: true,
     expect: { requireAssertions: true },

@@ -126,20 +126,23 @@ function RecordingRow({ recording, desk }: { recording: Recording; desk: Recordi
             {t("Stop recording")}
           </button>
         )}
-        {!isUnderWay(recording) && !asks && (
-          <button class="button" type="button" onClick={() => setAsks(true)}>
-            {t("Delete")}
+        {!isUnderWay(recording) && (
+          // The second click of two takes back the first: what deletes stands elsewhere.
+          <button
+            class="button"
+            type="button"
+            onClick={({ currentTarget }) => {
+              currentTarget.focus(); // which not every browser does by itself
+              setAsks(!asks);
+            }}
+          >
+            {asks ? t("Keep it") : t("Delete")}
           </button>
         )}
         {!isUnderWay(recording) && asks && (
-          <>
-            <button class="button" type="button" onClick={() => void desk.remove(recording)}>
-              {t("Delete it for good")}
-            </button>
-            <button class="button" type="button" onClick={() => setAsks(false)}>
-              {t("Keep it")}
-            </button>
-          </>
+          <button class="button" type="button" onClick={() => void desk.remove(recording)}>
+            {t("Delete it for good")}
+          </button>
         )}
       </div>
     </li>
