@@ -108,7 +108,10 @@ test("who asks for access is given a token by somebody who may, and is in with i
   await signIn(other, "root", password);
   const request = other.locator('[data-request="tablet"]');
   await expect(request).toContainText("cell 3");
-  await request.getByRole("button", { name: "Approve" }).click();
+  await expect(async () => {
+    await request.getByRole("button", { name: "Approve" }).click(); // not before it has been seen
+    await expect(request).toBeHidden({ timeout: 200 });
+  }).toPass();
   await expect(page.locator(".ask-token")).toHaveText(/^rrg_/);
   await page.getByRole("button", { name: "Sign in with this token" }).click();
   await expect(page.getByRole("group", { name: "You" })).toContainText("viewer");

@@ -19,9 +19,9 @@ const POLL_MS = 5_000;
 export class AccessDesk {
   readonly pending = new Store<AccessRequest[]>([]);
   readonly trouble = new Store<string | null>(null);
-  readonly #session: Session;
+  readonly #session: Pick<Session, "fetch" | "who">;
 
-  constructor(session: Session) {
+  constructor(session: Pick<Session, "fetch" | "who">) {
     this.#session = session;
     session.who.watch((who) => {
       if (who?.admin) void this.#list();
@@ -61,7 +61,9 @@ export class AccessDesk {
   async #list(): Promise<void> {
     try {
       const response = await this.#session.fetch(PATH);
-      if (response.ok) this.pending.value = readRequests(await response.json());
+      if (!response.ok) return;
+      const requests = readRequests(await response.json());
+      if (this.#session.who.value?.admin) this.pending.value = requests; // it may be another user by now
     } catch {
       // The list of devices tells that the gateway is away.
     }

@@ -5,18 +5,20 @@ import { useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
 import type { AccessDesk, AccessRequest } from "../gateway/access";
+import { useMeant, useSettled } from "../ui/use_settled";
 import { sentence } from "../ui/words";
 
 export function AccessPart({ access }: { access: AccessDesk }) {
   const pending = useStore(access.pending);
   const trouble = useStore(access.trouble);
+  const isSettled = useSettled(pending.map(({ id }) => id).join());
   if (pending.length === 0 && trouble === null) return null;
   return (
     <section class="access-part" aria-label={t("Requests of access")}>
       <h2 class="place-name">{t("Access")}</h2>
       <ul class="devices">
         {pending.map((request) => (
-          <RequestRow key={request.id} request={request} access={access} />
+          <RequestRow key={request.id} request={request} access={access} isSettled={isSettled} />
         ))}
       </ul>
       {trouble !== null && (
@@ -28,7 +30,14 @@ export function AccessPart({ access }: { access: AccessDesk }) {
   );
 }
 
-function RequestRow({ request, access }: { request: AccessRequest; access: AccessDesk }) {
+interface RequestRowProps {
+  request: AccessRequest;
+  access: AccessDesk;
+  isSettled: () => boolean;
+}
+
+function RequestRow({ request, access, isSettled }: RequestRowProps) {
+  const meant = useMeant(isSettled);
   const [roles, setRoles] = useState("viewer");
   const words = roles.split(/[\s,]+/).filter((role) => role !== "");
   return (
@@ -37,21 +46,20 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
         <strong>{request.name}</strong> <span class="code">({request.client})</span> {t("asks for access")}
         {request.reason !== "" && <>: {request.reason}</>}
       </p>
-      <form
-        class="access-form"
-        onSubmit={(event) => {
-          event.preventDefault();
-          void access.approve(request, words);
-        }}
-      >
+      <form class="access-form" onSubmit={(event) => event.preventDefault()}>
         <label>
           {t("Roles")}{" "}
           <input class="field" type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
         </label>
-        <button class="button" type="submit" disabled={words.length === 0}>
+        <button
+          class="button"
+          type="submit" // Enter in the field presses it
+          disabled={words.length === 0}
+          {...meant(() => void access.approve(request, words))}
+        >
           {t("Approve")}
         </button>
-        <button class="button" type="button" onClick={() => void access.deny(request)}>
+        <button class="button" type="button" {...meant(() => void access.deny(request))}>
           {t("Deny")}
         </button>
       </form>

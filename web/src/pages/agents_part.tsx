@@ -1,17 +1,16 @@
 // What agents ask to be allowed, for those who decide on it, wherever they are in the page; and the stop for all agents.
 // Layer: web/pages. Nothing that is asked moves the page: who is about to press something there must not hit something else.
 
-import { useRef } from "preact/hooks";
 import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
 import { StopPress } from "../board/stop";
 import type { AgentsDesk, Answer, Approval } from "../gateway/agents";
 import { Failure } from "../ui/failure";
+import { useMeant, useSettled } from "../ui/use_settled";
 import { clockTime, span } from "../ui/words";
 
 const GRANT_MINUTES = 10;
 const STOP_MINUTES = 10;
-const SETTLED_MS = 700; // a press that was meant for what stood there before
 
 export function AgentsPart({ agents }: { agents: AgentsDesk }) {
   const state = useStore(agents.state);
@@ -60,13 +59,6 @@ export function AgentsPart({ agents }: { agents: AgentsDesk }) {
   );
 }
 
-/** @returns whether what `shown` names has stood where it is for long enough to be what somebody meant. */
-function useSettled(shown: string): () => boolean {
-  const last = useRef({ shown: "", at: 0 });
-  if (shown !== last.current.shown) last.current = { shown, at: performance.now() };
-  return () => performance.now() - last.current.at > SETTLED_MS;
-}
-
 interface ApprovalRowProps {
   approval: Approval;
   leftMs: number;
@@ -76,11 +68,8 @@ interface ApprovalRowProps {
 
 function ApprovalRow({ approval, leftMs, isSettled, answer }: ApprovalRowProps) {
   const { id, user, client, device, path, member, verb, values, why } = approval;
-  const isMeant = useRef(true);
-  const allow = (given: Answer) => ({
-    onPointerDown: () => void (isMeant.current = isSettled()),
-    onClick: ({ detail }: MouseEvent) => (detail === 0 || isMeant.current) && isSettled() && answer(given),
-  });
+  const meant = useMeant(isSettled);
+  const allow = (given: Answer) => meant(() => answer(given));
   return (
     <li class="approval" data-approval={id}>
       <p role="alert">
