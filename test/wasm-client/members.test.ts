@@ -409,6 +409,29 @@ describe("object references", () => {
     expect((await failure(m("head").get(5))).message).toBe("head: is one object, it takes no index");
   });
 
+  it("are looked up with limits that are nobody else's", async () => {
+    const ended = new AbortController();
+    const limited = failure(m("parts").get(3, { signal: ended.signal }));
+    const usual = m("parts").get<RemoteObject>(3);
+    ended.abort(new Error("enough"));
+    expect((await limited).message).toBe("enough");
+    expect((await usual).$.path).toBe("test.parts[3]");
+    const again = m("parts").get(3, { timeout: 5_000 });
+    expect(await again).toBe(await usual);
+  });
+
+  it("know when the service has replaced an object that was looked up with limits", async () => {
+    const { signal } = new AbortController();
+    const head = await m("head").get<RemoteObject>({ signal });
+    await m("release")("test.head");
+    expect(head.$.state).toBe("released");
+    const usual = await m("head").get<RemoteObject>();
+    const limited = await m("head").get<RemoteObject>({ timeout: 5_000 });
+    await m("release")("test.head");
+    expect([usual.$.state, limited.$.state]).toEqual(["released", "released"]);
+    expect((await m("head").get<RemoteObject>({ signal })).$.state).toBe("connected");
+  });
+
   it("know when the service has replaced an object", async () => {
     const head = await m("head").get<RemoteObject>();
     const inner = await head["inner"]!.get<RemoteObject>();

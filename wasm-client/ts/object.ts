@@ -47,9 +47,18 @@ const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
  */
 const implicitNames = new Set(["then", "toString", "toJSON", "valueOf"]);
 
+/** What is known at a path until the service releases it. */
+interface Known {
+  /** A look-up that all may wait for. */
+  shared?: Promise<RemoteObject>;
+  object?: RemoteObject;
+  /** Tells all objects that were made of it. */
+  readonly released: (() => void)[];
+}
+
 /** The objects of one session, by path. */
 export class ObjectTree {
-  readonly #objects = new Map<string, { object: Promise<RemoteObject>; released: (() => void)[] }>();
+  readonly #objects = new Map<string, Known>();
   readonly #session: Session;
 
   constructor(session: Session) {
@@ -58,29 +67,46 @@ export class ObjectTree {
   }
 
   root(path: string, type: string): RemoteObject {
-    const released: (() => void)[] = [];
-    const object = this.#build(path, type, released, true);
-    this.#objects.set(path, { object: Promise.resolve(object), released });
-    return object;
+    const known = this.#knownAt(path);
+    known.object = this.#build(path, type, known.released, true);
+    known.shared = Promise.resolve(known.object);
+    return known.object;
   }
 
   find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
-    const known = this.#objects.get(path);
     // A look-up with limits of its own shares nothing: its end must not be that of others.
     // Nor does one that comes too late: the request says why.
     const isShared = !options.signal && options.timeout === undefined && !this.#session.isClosed;
-    if (known && isShared) return known.object;
-    const released: (() => void)[] = [];
-    const object = this.#session
-      .request((core) => core.findObject(path), options)
-      .then((type) => this.#build(path, type as string, released));
-    if (known) return object;
-    const entry = { object, released };
-    this.#objects.set(path, entry);
+    const before = this.#objects.get(path)?.shared;
+    if (before && isShared) return before;
+    let found: RemoteObject;
+    const ask = this.#session.request(
+      (core) => core.findObject(path),
+      options,
+      (type) => (found = this.#take(path, type as string)), // at once: its release may follow in the same message
+    );
+    const object = ask.then(() => found);
+    if (!isShared) return object;
+    const known = this.#knownAt(path);
+    known.shared = object;
     object.catch(() => {
-      if (this.#objects.get(path) === entry) this.#objects.delete(path);
+      delete known.shared;
+      if (!known.object && this.#objects.get(path) === known) this.#objects.delete(path);
     });
     return object;
+  }
+
+  #knownAt(path: string): Known {
+    const known = this.#objects.get(path) ?? { released: [] };
+    this.#objects.set(path, known);
+    return known;
+  }
+
+  /** The object that was found there before, where it is still of this type. */
+  #take(path: string, type: string): RemoteObject {
+    const known = this.#knownAt(path);
+    if (known.object?.$.type !== type) known.object = this.#build(path, type, known.released);
+    return known.object;
   }
 
   #release(path: string): void {
