@@ -256,6 +256,16 @@ describe("events", () => {
     expect(sides).toEqual([0, 1, 2, 3, 4]);
   });
 
+  it("end a loop that more than 64 MiB wait for with an error", async () => {
+    const loop = (m("bump") as unknown as AsyncIterable<unknown>)[Symbol.asyncIterator]();
+    const text = "x".repeat(2 ** 21); // 4 MiB here
+    for (let side = 0; side < 17; ++side) await m("fire_bump")(side, text);
+    for (let side = 0; side < 15; ++side) expect((await loop.next()).value[0]).toBe(side);
+    const error = await failure(loop.next());
+    expect(error.code).toBe(ErrorCode.OutOfSystemResource);
+    expect(error.message).toContain("bump or 67108864 bytes");
+  });
+
   it("end a loop with the reason why there will be no more", async () => {
     const loop = (async () => {
       for await (const _ of m("bump"));
@@ -412,7 +422,7 @@ describe("object references", () => {
   it("are looked up with limits that are nobody else's", async () => {
     const ended = new AbortController();
     const limited = failure(m("parts").get(3, { signal: ended.signal }));
-    const usual = m("parts").get<RemoteObject>(3);
+    const usual: Promise<RemoteObject> = m("parts").get(3);
     ended.abort(new Error("enough"));
     expect((await limited).message).toBe("enough");
     expect((await usual).$.path).toBe("test.parts[3]");

@@ -20,6 +20,10 @@ object Root
   function void publish_both(double x)
   function void hang()
   function void stream_echo(double x, int32 count)
+  pipe double[] blocks
+  function void stream_blocks(double[] block, int32 count)
+  event filled(double[] block)
+  function void fire_filled(double[] block)
   function void close_echo()
 end`;
 
@@ -398,6 +402,27 @@ it("ends a loop over a pipe that is too far behind", async () => {
   await settle();
   for (let i = 0; i < 10; ++i) expect((await packets.next()).value).toBe(1);
   expect((await failure(packets.next())).code).toBe(ErrorCode.OutOfSystemResource);
+  await subscription.close();
+});
+
+it("ends a loop over a pipe or an event whose values are too large to wait", async () => {
+  const subscription = follow(inTurn(await start()));
+  const pipe = subscription.pipe("blocks", { maxBytes: 10_000 });
+  const event = subscription.event("filled", { maxBytes: 10_000 });
+  const [packets, occurrences] = [pipe[Symbol.asyncIterator](), event[Symbol.asyncIterator]()];
+  const client = await subscription.client();
+  await vi.waitUntil(() => pipe.isConnected && event.isConnected);
+  const block = new Float64Array(1000);
+  await client["stream_blocks"]!(block, 2);
+  for (let i = 0; i < 2; ++i) await client["fire_filled"]!(block);
+  await settle();
+  expect((await packets.next()).value).toEqual(block);
+  expect((await occurrences.next()).value).toEqual([block]);
+  for (const loop of [packets, occurrences]) {
+    const error = await failure(loop.next());
+    expect(error.code).toBe(ErrorCode.OutOfSystemResource);
+    expect(error.message).toContain("10000 bytes");
+  }
   await subscription.close();
 });
 

@@ -2,7 +2,7 @@
 import type { Clock } from "./clock.js";
 import { asyncDispose } from "./dispose.js";
 import { callSafely, makeError } from "./errors.js";
-import { ValueQueue } from "./members/queue.js";
+import { queueLimits, ValueQueue } from "./members/queue.js";
 import { ValueStore } from "./store.js";
 import type { Store } from "./store.js";
 import type { Subscription } from "./subscribe.js";
@@ -16,6 +16,8 @@ export interface MemberSubscriptionOptions {
 export interface PipeSubscriptionOptions extends MemberSubscriptionOptions {
   /** Packets that a loop may be behind; more end it with an error. 10,000. */
   limit?: number | undefined;
+  /** Bytes, about, that it may be behind. 64 MiB. */
+  maxBytes?: number | undefined;
 }
 
 /** To the next attempt, where a member could not be connected or the service closed it. */
@@ -192,18 +194,16 @@ export class WireSubscription<T = RrValue> extends StreamSubscription<WireConnec
 
 /** All packets of a pipe, in order for each connection. */
 export class PipeSubscription<T = RrValue> extends StreamSubscription<PipeEndpoint<T, unknown>, T> {
-  readonly #limit: number;
+  readonly #options: PipeSubscriptionOptions;
 
   /** Use Subscription.pipe(). */
   constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
     super(subscription, clock, member, options.path ?? "*");
-    this.#limit = options.limit ?? 10_000;
+    this.#options = options;
   }
 
   protected makeQueue(onReturn: () => void): ValueQueue<T> {
-    return new ValueQueue<T>(this.#limit, onReturn, () =>
-      makeError("OutOfSystemResource", `${this.#limit} packets of pipe ${this.member} wait and nobody takes them`),
-    );
+    return makeBounded(`packets of pipe ${this.member}`, this.#options, onReturn);
   }
 
   protected async connect(object: RemoteObject): Promise<PipeEndpoint<T, unknown>> {
@@ -221,18 +221,16 @@ interface Occurrences<A> extends Connection {
 
 /** The occurrences of an event, each as the array of its arguments. */
 export class EventSubscription<A extends unknown[] = RrValue[]> extends MemberSubscription<Occurrences<A>, A> {
-  readonly #limit: number;
+  readonly #options: PipeSubscriptionOptions;
 
   /** Use Subscription.event(). */
   constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
     super(subscription, clock, member, options.path ?? "*");
-    this.#limit = options.limit ?? 10_000;
+    this.#options = options;
   }
 
   protected makeQueue(onReturn: () => void): ValueQueue<A> {
-    return new ValueQueue<A>(this.#limit, onReturn, () =>
-      makeError("OutOfSystemResource", `${this.#limit} events ${this.member} wait and nobody takes them`),
-    );
+    return makeBounded(`events ${this.member}`, this.#options, onReturn);
   }
 
   protected connect(object: RemoteObject): Promise<Occurrences<A>> {
@@ -245,4 +243,17 @@ export class EventSubscription<A extends unknown[] = RrValue[]> extends MemberSu
   protected async follow({ loop }: Occurrences<A>): Promise<void> {
     for (let step = await loop.next(); !step.done; step = await loop.next()) this.receive(step.value);
   }
+}
+
+/** For a loop that ends with an error where more waits. */
+function makeBounded<T>(
+  what: string,
+  { limit = queueLimits.limit, maxBytes = queueLimits.maxBytes }: PipeSubscriptionOptions,
+  onReturn: () => void,
+): ValueQueue<T> {
+  const overflow = () => {
+    const found = `more than ${limit} ${what} or ${maxBytes} bytes of them wait`;
+    return makeError("OutOfSystemResource", `${found} and nobody takes them`);
+  };
+  return new ValueQueue<T>(limit, onReturn, overflow, maxBytes);
 }

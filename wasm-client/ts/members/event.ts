@@ -3,10 +3,10 @@ import { makeError } from "../errors.js";
 import type { EventMember, RrValue } from "../types.js";
 import { checkSignal } from "../within.js";
 import type { MemberContext } from "./member.js";
-import { ValueQueue } from "./queue.js";
+import { queueLimits, ValueQueue } from "./queue.js";
 
-/** Events that a loop may be behind. They are never dropped silently: a loop that is slower ends with an error. */
-const queueLimit = 10_000;
+/** What a loop may be behind. Events are never dropped silently: a loop that is slower ends with an error. */
+const { limit, maxBytes } = queueLimits;
 
 export function makeEvent({ session, path, info }: MemberContext): EventMember {
   const listen = (onEvent: (args: RrValue[]) => void) => session.listen(path, info.name, { onEvent });
@@ -45,10 +45,12 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
         stopListening();
         stopClosing();
       };
-      const queue = new ValueQueue<RrValue[]>(queueLimit, end, () => {
+      const overflow = () => {
         end();
-        return makeError("OutOfSystemResource", `${queueLimit} events ${info.name} wait and nobody takes them`);
-      });
+        const what = `more than ${limit} events ${info.name} or ${maxBytes} bytes of them wait`;
+        return makeError("OutOfSystemResource", `${what} and nobody takes them`);
+      };
+      const queue = new ValueQueue<RrValue[]>(limit, end, overflow, maxBytes);
       const stopListening = listen((args) => queue.push(args));
       const stopClosing = session.onEnd(path, (reason) => (reason ? queue.fail(reason) : queue.end()));
       return queue;

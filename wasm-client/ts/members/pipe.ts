@@ -13,10 +13,8 @@ import type {
 import { checkSignal, within } from "../within.js";
 import { lossesOf } from "./member.js";
 import type { MemberContext } from "./member.js";
-import { ValueQueue } from "./queue.js";
+import { queueLimits, ValueQueue } from "./queue.js";
 
-const defaultLimit = 10_000;
-const defaultMaxBytes = 64 * 1024 * 1024;
 /** Packets that wait for their acknowledgement; a service that never sends one must not fill the memory. */
 const maxAcks = 65_536;
 const anyIndex = -1;
@@ -103,7 +101,7 @@ class Endpoint implements PipeEndpoint {
   constructor(
     private readonly context: MemberContext,
     readonly index: number,
-    { limit = defaultLimit, maxBytes = defaultMaxBytes }: PipeConnectOptions,
+    { limit = queueLimits.limit, maxBytes = queueLimits.maxBytes }: PipeConnectOptions,
     private readonly gone: () => void,
   ) {
     const overflow = () => {

@@ -1,5 +1,8 @@
 // What stands between a member that gives and a loop that takes. Layer: wasm-client/ts/members.
 
+/** What may wait for a consumer that says nothing else. */
+export const queueLimits = { limit: 10_000, maxBytes: 64 * 1024 * 1024 };
+
 /** Collects values for one consumer. `limit` 1: only the newest is kept. */
 export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   readonly #values: T[] = [];
