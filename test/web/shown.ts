@@ -1,4 +1,5 @@
-// Components in a page without a browser: what they show, and what a person does there.
+// Components in a page without a browser: what they show, and what a person does there. Import it before them: some look at
+// the page when they are loaded.
 import { h, options, render } from "preact";
 import type { ComponentType } from "preact";
 import { Window } from "happy-dom";

@@ -13,7 +13,7 @@ import { PipeRow } from "../members/pipe_row";
 import { PropertyRow } from "../members/property_row";
 import type { MemberRowProps } from "../members/row";
 import { WireRow } from "../members/wire_row";
-import type { MemberKind, Remote } from "../robot/remote";
+import type { Member, MemberKind, Remote } from "../robot/remote";
 
 const GROUPS: readonly { kind: MemberKind; title: string; Row: ComponentType<MemberRowProps> }[] = [
   { kind: "objref", title: "Objects", Row: ObjrefRow },
@@ -48,7 +48,7 @@ export function ObjectView({ object, live, route }: ObjectViewProps) {
             <h2 id={`group-${kind}`}>{t(title)}</h2>
             <ul class="rows">
               {members.map((member) => (
-                <li key={member.name} class="row" data-member={member.name}>
+                <li key={keyOf(member)} class="row" data-member={member.name}>
                   <Row object={object} member={member} live={live} route={route} />
                 </li>
               ))}
@@ -57,4 +57,9 @@ export function ObjectView({ object, live, route }: ObjectViewProps) {
         ))}
     </div>
   );
+}
+
+/** What is typed in stays over an outage, unless the definition asks for something else since then. */
+function keyOf({ name, type, parameters }: Member): string {
+  return [name, type, ...parameters.map((each) => `${each.type} ${each.name}`)].join();
 }

@@ -69,9 +69,9 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
   const fit = (old: FormDrafts | null): FormDrafts => fitDrafts(old, inputs, definitions, scope);
   const [form, setForm] = useState(() => fit(null));
   const { drafts, emptied } = form;
-  const isTouched = useRef(false);
-  const setDrafts = (next: FormDrafts["drafts"]): void => {
-    isTouched.current = true;
+  const isTouched = useRef(false); // by a person: it stays as it is, whatever the device has
+  const setDrafts = (next: FormDrafts["drafts"], isTyped: boolean): void => {
+    isTouched.current = isTyped;
     setForm((old) => ({ ...old, drafts: next, emptied: [] }));
   };
   const [done, setDone] = useState<readonly Done[]>([]);
@@ -111,18 +111,22 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
   const isReadable = member.kind === "property" && !member.modifiers.includes("writeonly");
   const read = (): void =>
     doing.run(async () => {
-      if (object) setDrafts([draftOf(await object.get(member.name), member.type, definitions, scope)]);
+      if (object) setDrafts([draftOf(await object.get(member.name), member.type, definitions, scope)], false);
     });
-  // What a property is, not a 0 that nobody gave it; and never over what was typed in meanwhile.
+  // What a property is, on each connection, not a 0 that nobody gave it; and never over what was typed in meanwhile.
   useEffect(() => {
     if (!object || !isReadable) return;
     let isWanted = true;
     object.get(member.name).then(
-      (value) => isWanted && !isTouched.current && setDrafts([draftOf(value, member.type, definitions, scope)]),
+      (value) => isWanted && !isTouched.current && setDrafts([draftOf(value, member.type, definitions, scope)], false),
       () => undefined, // whoever presses Read learns why
     );
     return () => void (isWanted = false);
   }, [object, member, definitions]);
+  const take = (before: FormDrafts): void => {
+    isTouched.current = true;
+    setForm(fit(before));
+  };
   const isPlain = inputs.length === 0 && !withMore; // beside others of its kind its name says it all
   const word = member.kind === "function" ? t("Call") : member.kind === "property" ? t("Set") : t("Send");
   const [newest] = done;
@@ -136,7 +140,12 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           definitions={definitions}
           scope={scope}
           draft={drafts[i] ?? makeDraft(type, definitions, scope)}
-          change={(next) => setDrafts(drafts.map((old, at) => (at === i ? next : old)))}
+          change={(next) =>
+            setDrafts(
+              drafts.map((old, at) => (at === i ? next : old)),
+              true,
+            )
+          }
         />
       ))}
       <div class="row-line">
@@ -177,7 +186,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
         }
       />
       {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
-      {withMore && done.length > 0 && <History done={done} take={(before) => setForm(fit(before))} />}
+      {withMore && done.length > 0 && <History done={done} take={take} />}
       {withMore && <Code member={member} values={values} place={place} types={{ definitions, scope }} />}
     </form>
   );

@@ -1,0 +1,83 @@
+// Fields for values: what stands in them over an outage.
+import { clear, enter, find, press, settle, show } from "./shown";
+import { ObjectView } from "../../web/src/pages/object_view";
+import type { ObjectViewProps } from "../../web/src/pages/object_view";
+import FormPanel from "../../web/src/panels/form_panel";
+import type { PanelProps } from "../../web/src/panels/panel";
+import type { Member, Remote } from "../../web/src/robot/remote";
+import { Definitions } from "../../web/src/values/definitions";
+
+afterEach(clear);
+
+const memberOf = (of: Partial<Member>): Member => ({
+  name: "speed",
+  kind: "property",
+  type: "double",
+  parameters: [],
+  modifiers: [],
+  documentation: "",
+  ...of,
+});
+
+describe("a form of a property", () => {
+  const connected = (value: number) => ({ get: () => Promise.resolve(value) }) as unknown as Remote;
+  const start = () =>
+    show(FormPanel, {
+      object: connected(1),
+      members: [memberOf({})],
+      definitions: new Definitions([]),
+      scope: "",
+      place: { device: "d", service: "s", object: "" },
+      settings: {},
+      change: () => undefined,
+    } as unknown as PanelProps);
+  const field = () => find<HTMLInputElement>("input.field");
+
+  test("shows on each connection what the device has then", async () => {
+    const update = start();
+    await settle();
+    expect(field().value).toBe("1");
+    await update({ object: null });
+    expect(field().value).toBe("1");
+    await update({ object: connected(2), members: [memberOf({})] });
+    expect(field().value).toBe("2");
+    await press("Read speed");
+    await update({ object: connected(3) });
+    expect(field().value).toBe("3");
+  });
+
+  test("keeps what was typed", async () => {
+    const update = start();
+    await settle();
+    await enter(field(), "7");
+    await update({ object: null });
+    await update({ object: connected(2), members: [memberOf({})] });
+    expect(field().value).toBe("7");
+  });
+});
+
+describe("a row of a function", () => {
+  const objectOf = (...names: string[]): Remote =>
+    ({
+      type: "a.B",
+      members: [
+        memberOf({
+          name: "move",
+          kind: "function",
+          type: "void",
+          parameters: names.map((name) => ({ name, type: "double" })),
+        }),
+      ],
+    }) as unknown as Remote;
+  const texts = () => [...document.querySelectorAll<HTMLInputElement>("input")].map(({ value }) => value);
+
+  test("keeps what was typed over an outage, but not for another parameter", async () => {
+    const update = show(ObjectView, { object: objectOf("speed"), live: true, route: {} } as unknown as ObjectViewProps);
+    await settle();
+    await enter(find<HTMLInputElement>("input"), "5");
+    await update({ object: objectOf("speed") });
+    expect(texts()).toEqual(["5"]);
+    await update({ object: objectOf("angle", "speed") });
+    expect(texts()).toEqual(["", ""]);
+  });
+});
