@@ -321,6 +321,7 @@ test("a camera of another device stands beside the robot, with an object of its 
   await openBoard(page, lab.url);
   await panel(page, "Left camera").getByRole("button", { name: "Start stream" }).click();
   await expect(panel(page, "Left camera").locator(".panel-foot")).toContainText("320 × 240");
+  await expect(panel(page, "Left camera").getByRole("button", { name: "Start stream" })).toBeHidden();
   await addPanel(page, "image");
   const image = page.locator('[data-panel="image"]').last();
   await image.getByLabel("Service").selectOption("webcams/Webcam");

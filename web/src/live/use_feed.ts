@@ -49,7 +49,7 @@ export function useFeed(object: Remote | null, kind: FeedKind | null, member: st
     }, LOOK_MS);
     return () => clearInterval(timer);
   }, [object, member]);
-  return look;
+  return look.feed?.member === member ? look : NOTHING; // not what another member said
 }
 
 /** Calls `heard` with each value. */

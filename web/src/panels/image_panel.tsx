@@ -27,19 +27,22 @@ export default function ImagePanel({ object, members, place, settings, change }:
   const look = useFeed(object, kind, name);
   const [shown, setShown] = useState<{ size: string; failure: string | null }>({ size: "", failure: null });
   const acting = useAction();
-  const draw = async (value: unknown): Promise<void> => {
+  const source = [place.device, place.service, place.object, name].join("/");
+  // Each source has a canvas of its own: what comes late from another one is drawn where nobody sees it.
+  const draw = async (value: unknown, on: HTMLCanvasElement | null): Promise<void> => {
+    const show = (next: { size?: string; failure: string | null }): void => {
+      if (canvas.current !== on) return;
+      setShown((old) =>
+        old.failure === next.failure && old.size === (next.size ?? old.size) ? old : { ...old, ...next },
+      );
+    };
     try {
-      const size = await drawFrame(canvas.current, value);
-      setShown((old) => (old.size === size && old.failure === null ? old : { size, failure: null }));
+      show({ size: await drawFrame(on, value), failure: null });
     } catch (error) {
-      setShown((old) => ({ ...old, failure: explain(error) }));
+      show({ failure: explain(error) });
     }
   };
-  const source = [place.device, place.service, place.object, name].join("/");
-  useEffect(() => {
-    if (canvas.current) [canvas.current.width, canvas.current.height] = EMPTY; // no picture of another one
-    setShown({ size: "", failure: null });
-  }, [source]);
+  useEffect(() => setShown({ size: "", failure: null }), [source]);
   const feed = look.feed;
   useEffect(() => {
     if (!feed || feed.kind !== kind || feed.member !== name) return;
@@ -51,12 +54,16 @@ export default function ImagePanel({ object, members, place, settings, change }:
       if (isDrawing || feed.newest === undefined || feed.newest === drawn) return;
       drawn = feed.newest;
       isDrawing = true;
-      void draw(drawn).finally(() => (isDrawing = false));
+      void draw(drawn, canvas.current).finally(() => (isDrawing = false));
     };
     next();
     return () => cancelAnimationFrame(frame);
   }, [feed, kind, name]);
-  const take = (): void => acting.run(async () => draw(await object?.call(name, [])));
+  const take = (): void =>
+    acting.run(async () => {
+      const on = canvas.current;
+      await draw(await object?.call(name, []), on);
+    });
   const begin = (): void => acting.run(async () => void (start && (await object?.call(start, []))));
   const save = (): void =>
     canvas.current?.toBlob((blob) => {
@@ -67,7 +74,8 @@ export default function ImagePanel({ object, members, place, settings, change }:
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
     });
-  const starter = kind === "pipe" && start && (
+  const streams = look.rate > 0; // regularly: one picture alone does not say so
+  const starter = kind === "pipe" && start && !streams && (
     <button
       class={shown.size === "" ? "button" : "button button-quiet"}
       type="button"
@@ -86,13 +94,20 @@ export default function ImagePanel({ object, members, place, settings, change }:
             {t("Take")}
           </button>
         )}
-        {shown.size !== "" && starter}
         <button class="button button-quiet" type="button" disabled={shown.size === ""} onClick={save}>
           PNG
         </button>
+        {shown.size !== "" && starter}
       </div>
       <div class={`image-box ${look.stale === null ? "" : "is-stale"}`}>
-        <canvas ref={canvas} width={EMPTY[0]} height={EMPTY[1]} role="img" aria-label={t("Picture of {0}", name)} />
+        <canvas
+          key={source}
+          ref={canvas}
+          width={EMPTY[0]}
+          height={EMPTY[1]}
+          role="img"
+          aria-label={t("Picture of {0}", name)}
+        />
         {shown.size === "" && starter}
       </div>
       <Failure text={shown.failure ?? acting.failure} />

@@ -4,6 +4,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useAction } from "../members/row";
+import type { Member, Remote } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
@@ -22,40 +23,6 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
   const view = VIEWS.find((each) => each === textIn(settings, "view")) ?? "hex";
-  const [size, setSize] = useState<readonly number[]>([]);
-  const [position, setPosition] = useState("0");
-  const [count, setCount] = useState(String(AT_FIRST));
-  const [text, setText] = useState("");
-  const [shown, setShown] = useState<{ value: unknown; from: number } | null>(null);
-  const acting = useAction();
-  const placed = useRef(""); // of what Position and Items are: they stay over an outage, as the new items do
-  useEffect(() => {
-    setShown(null);
-    if (!object || !member) return;
-    acting.run(async () => {
-      const found = await object.dimensions(name);
-      setSize(found);
-      const of = `${name} ${found.join()}`;
-      if (placed.current === of) return;
-      placed.current = of;
-      setPosition(found.map(() => 0).join(", "));
-      setCount(found.map((items) => Math.min(items, found.length === 1 ? AT_FIRST : 32)).join(", "));
-    });
-  }, [object, name]);
-  const numbers = (given: string): number[] => Array.from(parseInput(given, "uint32[]") as ArrayLike<number>);
-  const readItems = async (): Promise<void> => {
-    const at = numbers(position);
-    const value = await object?.read(name, at, numbers(count));
-    setShown({ value, from: at[0] ?? 0 });
-  };
-  const write = (event: Event): void => {
-    event.preventDefault();
-    acting.run(async () => {
-      await object?.write(name, numbers(position), parseInput(text, member?.type ?? ""));
-      await readItems();
-    });
-  };
-  const off = !object || !member || acting.busy;
   return (
     <div class="memory-panel panel-scroll">
       <div class="panel-tools">
@@ -75,6 +42,56 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
           </select>
         </label>
       </div>
+      <Items key={name} object={object} name={name} member={member} view={view} />
+    </div>
+  );
+}
+
+interface ItemsProps {
+  object: Remote | null;
+  name: string;
+  member: Member | undefined;
+  view: View;
+}
+
+/** Of one memory: what is answered late is not shown as another's. */
+function Items({ object, name, member, view }: ItemsProps) {
+  const [size, setSize] = useState<readonly number[]>([]);
+  const [position, setPosition] = useState("0");
+  const [count, setCount] = useState(String(AT_FIRST));
+  const [text, setText] = useState("");
+  const [shown, setShown] = useState<{ value: unknown; from: number } | null>(null);
+  const acting = useAction();
+  const placed = useRef(""); // the size that Position and Items are for: they stay over an outage, as the new items do
+  useEffect(() => {
+    setShown(null);
+    if (!object || !member) return;
+    acting.run(async () => {
+      const found = await object.dimensions(name);
+      setSize(found);
+      const of = found.join();
+      if (placed.current === of) return;
+      placed.current = of;
+      setPosition(found.map(() => 0).join(", "));
+      setCount(found.map((items) => Math.min(items, found.length === 1 ? AT_FIRST : 32)).join(", "));
+    });
+  }, [object]);
+  const numbers = (given: string): number[] => Array.from(parseInput(given, "uint32[]") as ArrayLike<number>);
+  const readItems = async (): Promise<void> => {
+    const at = numbers(position);
+    const value = await object?.read(name, at, numbers(count));
+    setShown({ value, from: at[0] ?? 0 });
+  };
+  const write = (event: Event): void => {
+    event.preventDefault();
+    acting.run(async () => {
+      await object?.write(name, numbers(position), parseInput(text, member?.type ?? ""));
+      await readItems();
+    });
+  };
+  const off = !object || !member || acting.busy;
+  return (
+    <>
       <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), acting.run(readItems))}>
         <TextField label={t("Position")} text={position} change={setPosition} />
         <TextField label={t("Items")} text={count} change={setCount} />
@@ -93,7 +110,7 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
           </button>
         </form>
       )}
-    </div>
+    </>
   );
 }
 
