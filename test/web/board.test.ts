@@ -164,7 +164,7 @@ describe("drafts", () => {
     expect(written(map, "varvalue{string}")).toEqual(new Map([["a", Float64Array.of(1)]]));
   });
 
-  test("of a varvalue stay numbers or text of the type that was read", () => {
+  test("of a varvalue stay of the type that was read", () => {
     expect(edited(Float64Array.of(1), "12")).toEqual(Float64Array.of(12));
     expect(edited(Float32Array.of(1.5), "[2.5, 3]")).toEqual(Float32Array.of(2.5, 3));
     expect(edited(BigUint64Array.of(1n), "18446744073709551615")).toEqual(BigUint64Array.of(2n ** 64n - 1n));
@@ -173,6 +173,16 @@ describe("drafts", () => {
     expect(edited("on", "")).toBe("");
     expect(edited(null, "12")).toBe(12);
     expect(edited({ x: 1 }, '{"x": 2}')).toEqual({ x: 2 });
+    const pose = Object.defineProperty({ x: 1 }, Symbol.for("rrgate.type"), { value: "com.example.arm.Pose" });
+    expect(edited(pose, '{"x": 2}')).toEqual({ type: "com.example.arm.Pose", value: { x: 2 } });
+    expect(() => edited(pose, "x: 2")).toThrow("is not valid JSON; expected com.example.arm.Pose");
+    expect(edited(pose, "")).toBeNull();
+    expect(edited(new Map([[1, "a"]]), '{"2": "b"}')).toEqual(new Map([[2, "b"]]));
+    expect(edited(new Map([["1", "a"]]), '{"2": "b"}')).toEqual(new Map([["2", "b"]]));
+    expect(edited({ dims: [1], data: Float32Array.of(1) }, '{"dims": [1], "data": [2]}')).toEqual({
+      dims: [1],
+      data: Float32Array.of(2),
+    });
     expect(edited({ re: 1, im: -2 }, "[3, 4]", "cdouble")).toEqual({ re: 3, im: 4 });
     expect(written({ kind: "list", items: [] }, "string{list}")).toEqual([]);
   });

@@ -1,6 +1,6 @@
 // The part of `rrgate-client` that this page uses, by name: members appear only at run time, so they are looked up
 // and checked here, once, instead of being cast all over the pages.
-// Layer: web/robot. Others import of `rrgate-client` at most its errors, subscriptions, leases and USB devices.
+// Layer: web/robot. Others import of `rrgate-client` at most its errors, types of varvalues, subscriptions, leases and USB devices.
 
 import { lease, RobotRaconteurError } from "rrgate-client";
 import type {

@@ -1,6 +1,8 @@
 // A value while it is typed in: the same shape as its type, with texts where the value has words.
 // Layer: web/values, pure. Maps and arrays instead of objects, so that a field may have any name.
 
+import { rrValue, typeOf } from "rrgate-client";
+
 import type { Definitions } from "./definitions";
 import { enumName } from "./definitions";
 import { parseInput } from "./parse";
@@ -229,17 +231,27 @@ const ITEM_TYPES: Readonly<Record<string, string>> = {
   BigUint64Array: "uint64",
 };
 
-/** Numbers and texts stay of the type that the device had; else it is JSON, or a text. */
+/** It stays of the type that the device had, where that can be told; else it is JSON, or a text. */
 function varvalueOf(text: string, was: unknown): unknown {
   if (typeof was === "string") return text;
-  const items = ArrayBuffer.isView(was) ? ITEM_TYPES[was.constructor.name] : undefined;
+  const items = itemsOf(was);
   if (items !== undefined) return parseInput(text, `${items}[]`);
   if (text.trim() === "") return null;
+  const named = typeOf(was);
+  if (named !== undefined) return rrValue(named, parseInput(text, named));
+  if (was instanceof Map)
+    return parseInput(text, [...was.keys()].some(Number.isInteger) ? "varvalue{int32}" : "varvalue{string}");
+  const cells = itemsOf((was as { data?: unknown } | null | undefined)?.data);
+  if (cells !== undefined) return parseInput(text, `${cells}[*]`);
   try {
     return JSON.parse(text);
   } catch {
     return text;
   }
+}
+
+function itemsOf(value: unknown): string | undefined {
+  return ArrayBuffer.isView(value) ? ITEM_TYPES[value.constructor.name] : undefined;
 }
 
 function at<T>(where: string, make: () => T): T {
