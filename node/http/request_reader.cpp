@@ -37,7 +37,17 @@ std::optional<ReadFailure> check_header(const HttpRequest& request) {
 }  // namespace
 
 RequestReader::RequestReader(rr::ByteStream& stream, RequestLimits limits)
-    : stream_(stream), limits_(limits), limit_(stream.executor(), [this] { stream_.cancel(); }) {}
+    : stream_(stream), limits_(limits), limit_(stream.executor(), [this] {
+        // Again and again: what is read at that moment can't be cancelled any more.
+        is_late_ = true;
+        stream_.cancel();
+        limit_.arm(rr::Watchdog::tick);
+      }) {}
+
+void RequestReader::arm(std::chrono::milliseconds limit) {
+  is_late_ = false;
+  limit_.arm(limit);
+}
 
 /// A header that goes on in another line: obsolete (RFC 9112, section 5.2), and not read alike by everybody. The parser
 /// takes no header before it has seen how the next line begins, so that both are in buffer_.
@@ -70,10 +80,9 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on(std::size_t chu
   buffer_.resize(had + chunk);
   const auto read = co_await stream_.read_some(std::span(buffer_).subspan(had));
   buffer_.resize(had + read.bytes);
-  if (!read.error && !read.is_end()) co_return std::nullopt;
-  const bool is_late = !limit_.is_armed();
+  if (!is_late_ && !read.error && !read.is_end()) co_return std::nullopt;
   limit_.disarm();
-  if (!is_late) co_return ReadFailure();
+  if (!is_late_) co_return ReadFailure();
   co_return ReadFailure{408, "the request took longer than " + std::to_string(limits_.header_timeout.count()) +
                                  " ms, or its body came with less than " + std::to_string(least_rate) +
                                  " bytes a second"};
@@ -87,7 +96,7 @@ rr::awaitable<ReadRequest> RequestReader::next() {
   std::size_t consumed = 0;
   // The first request follows the first bytes of the connection, so the short limit holds for it from the start.
   bool is_started = std::exchange(is_first_, false) || !buffer_.empty();
-  limit_.arm(is_started ? limits_.header_timeout : limits_.idle_timeout);
+  arm(is_started ? limits_.header_timeout : limits_.idle_timeout);
   for (;;) {
     boost::beast::error_code error;
     if (is_header_too_long(consumed)) error = http::error::header_limit;
@@ -102,7 +111,7 @@ rr::awaitable<ReadRequest> RequestReader::next() {
     // One that sends nothing is idle, not late.
     if (failure && !is_started) failure = ReadFailure();
     if (failure) co_return ReadRequest{std::nullopt, std::move(*failure)};
-    if (!std::exchange(is_started, true)) limit_.arm(limits_.header_timeout);
+    if (!std::exchange(is_started, true)) arm(limits_.header_timeout);
   }
   limit_.disarm();
   ReadRequest out;
@@ -145,7 +154,7 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_body(HttpRequest& 
           431, "a chunk's extensions, or trailers, longer than " + std::to_string(limits_.header_bytes) + " bytes"};
     const auto end = begin + limits_.header_timeout + std::chrono::milliseconds(received * 1000 / least_rate);
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-    limit_.arm(std::min(limits_.header_timeout, left));
+    arm(std::min(limits_.header_timeout, left));
     auto failure = co_await read_on(body_chunk);
     limit_.disarm();
     if (failure) co_return failure;

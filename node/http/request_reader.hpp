@@ -65,9 +65,13 @@ class RequestReader {
   static std::size_t parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error);
   rr::awaitable<std::optional<ReadFailure>> read_on(std::size_t chunk);
 
+  /// Reads have to end within that, until limit_ is disarmed.
+  void arm(std::chrono::milliseconds limit);
+
   rr::ByteStream& stream_;
   RequestLimits limits_;
   rr::Deadline limit_;
+  bool is_late_ = false;          ///< limit_ has passed
   std::optional<Parser> parser_;  ///< of the last request, where it has a body
   rr::Bytes buffer_;
   bool is_first_ = true;

@@ -53,14 +53,23 @@ class BeastStream final : public ByteStream {
     }
   }
   awaitable<error_code> write(std::span<const ByteSpan> slices) override {
-    std::vector<boost::asio::const_buffer> buffers;
-    for (const auto& slice : slices)
-      if (!slice.empty()) buffers.emplace_back(slice.data(), slice.size());
-    if (buffers.empty()) co_return error_code();  // an empty frame would end a native peer's connection
-    stall_.arm(send_stall_);
-    const auto [error, bytes] = co_await websocket_.async_write(buffers, await_tuple);
-    stall_.disarm();
-    co_return is_stalled_ ? error_code(boost::asio::error::timed_out) : error;
+    // In pieces: who takes one in time is slow, and not stalled.
+    std::vector<boost::asio::const_buffer> piece;
+    std::size_t size = 0;
+    for (auto slice : slices)
+      while (!slice.empty()) {
+        const auto part = slice.first(std::min(slice.size(), largest_piece - size));
+        piece.emplace_back(part.data(), part.size());
+        size += part.size();
+        slice = slice.subspan(part.size());
+        if (size < largest_piece) continue;
+        if (const auto failed = co_await write_piece(piece)) co_return failed;
+        piece.clear();
+        size = 0;
+      }
+    // An empty frame would end a native peer's connection.
+    if (piece.empty()) co_return error_code();
+    co_return co_await write_piece(piece);
   }
   /// WebSockets have no half-closed state: does nothing, end() follows.
   void finish_sending() override {}
@@ -78,6 +87,15 @@ class BeastStream final : public ByteStream {
   boost::asio::any_io_executor executor() override { return websocket_.get_executor(); }
 
  private:
+  static constexpr std::size_t largest_piece = 16 * 1024;
+
+  awaitable<error_code> write_piece(const std::vector<boost::asio::const_buffer>& piece) {
+    stall_.arm(send_stall_);
+    const auto [error, bytes] = co_await websocket_.async_write(piece, await_tuple);
+    stall_.disarm();
+    co_return is_stalled_ ? error_code(boost::asio::error::timed_out) : error;
+  }
+
   static constexpr auto await_tuple = boost::asio::as_tuple(boost::asio::use_awaitable);
 
   WebSocket websocket_;

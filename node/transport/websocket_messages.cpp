@@ -149,6 +149,7 @@ awaitable<std::optional<std::string>> WebSocketMessages::read() {
   for (;;) {
     if (decoder_.received_close()) co_return std::nullopt;
     if (unread_.empty()) {
+      if (has_room_) (void)has_room_(decoder_.held_bytes());  // the message of before is not held any more
       const auto read = co_await stream_.read_some(buffer_);
       if (read.error || read.is_end()) {
         is_broken_ = is_broken_ || read.error != asio::error::operation_aborted;

@@ -23,15 +23,16 @@ namespace {
 constexpr std::string_view service_folder = "/etc/rrgate";
 constexpr std::string_view service_log_folder = "/var/log/rrgate";
 
-/// Why the folder's configuration is somebody's already; empty: there is none, or it names neither devices nor users.
+/// Why the folder's configuration is somebody's already; empty: there is none, or it says no more than where to listen.
 std::string reason_to_keep(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) return {};
   const auto text = read_text_file(file.string());
   const auto read = parse_config(text.value_or(""));
   if (!text || !read.findings.empty()) return "is there already, and can't be read";
-  if (!read.config.devices.empty() || !read.config.access.users_file.empty())
-    return "is there already, with devices or users of its own";
+  auto plain = parse_config(R"({"listen": ["127.0.0.1:8080"], "devices": []})").config;
+  plain.listen = read.config.listen;
+  if (read.config != plain) return "is there already, and says more than where to listen";
   return {};
 }
 

@@ -141,14 +141,15 @@ void ResponseWriter::watch(std::function<void()> on_gone) {
   asio::co_spawn(stream_.executor(), read_while(watch_, stream_), asio::detached);
 }
 
-/// Bytes are the next request, which waits; their absence is the client's end.
+/// Bytes are the next request, which waits; their absence is the client's end. Of one that sends more than waits, no
+/// end would be noticed: it is taken for gone.
 rr::awaitable<void> ResponseWriter::read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream) {
   std::array<std::uint8_t, 4096> buffer;
   bool is_gone = false;
-  while (!is_gone && !watch->is_over && watch->early.size() < max_early_bytes) {
+  while (!is_gone && !watch->is_over) {
     const auto read = co_await stream.read_some(buffer);
     watch->early.insert(watch->early.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
-    is_gone = read.bytes == 0;
+    is_gone = read.bytes == 0 || watch->early.size() > max_early_bytes;
   }
   watch->is_done = true;
   if (is_gone && !watch->is_over) {

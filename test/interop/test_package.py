@@ -199,7 +199,7 @@ def test_a_folder_to_begin_with(root, tmp_path):
     assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/srv/lab/gateway.json").stdout
     again = root.run("rrgate", "init", "/srv/lab", fails=True)
     assert (again.returncode, again.stderr) == (
-        1, "rrgate init: /srv/lab/gateway.json: is there already, with devices or users of its own; nothing was written\n")
+        1, "rrgate init: /srv/lab/gateway.json: is there already, and says more than where to listen; nothing was written\n")
     file.write_text(file.read_text().replace("0.0.0.0:8443", f"127.0.0.1:{port}"))
     gateway = started(root, tmp_path / "log", "/srv/lab/gateway.json")
     try:

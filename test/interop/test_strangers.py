@@ -148,6 +148,10 @@ def test_at_its_end_what_is_new_is_refused_and_what_runs_goes_on(gateway, node):
         page.socket.send(json.dumps({"id": 1, "op": "get", "path": "version"}))
         assert "no memory left" in page.next(id=1)["error"]["message"]
         assert ask(gateway.port, "GET", "/healthz").status == 200
+        direct = node.ConnectService(gateway.config["devices"][0]["url"])
+        direct.fire(1)
+        assert stream.next()[1] != "error"
+        node.DisconnectService(direct)
         for stranger in strangers:
             stranger.close()
         deadline = time.monotonic() + 10

@@ -110,6 +110,12 @@ TEST_CASE("init: the configuration has a key of its own, so that sign-ins outliv
   const auto again = test::run_command("init", {std::filesystem::path(other.path("x")).parent_path().string()});
   CHECK(again.code == 1);
   CHECK_THAT(again.errors, Catch::Contains("tickets.key: is there already; nothing was written"));
+
+  const test::Folder third;
+  third.write("gateway.json", R"({"listen": ["127.0.0.1:8080"], "devices": [], "discover": {"allow": []}})");
+  const auto kept = test::run_command("init", {std::filesystem::path(third.path("x")).parent_path().string()});
+  CHECK(kept.code == 1);
+  CHECK_THAT(kept.errors, Catch::Contains("gateway.json: is there already, and says more than where to listen"));
 }
 
 TEST_CASE("passwd: what others have changed while the password was typed stays") {

@@ -29,6 +29,12 @@ class FakeClient final : public rr::ByteStream {
 
   rr::awaitable<rr::ReadResult> read_some(std::span<std::uint8_t> into) override {
     if (const auto count = take_put_back(into)) co_return rr::ReadResult{{}, count};
+    if (trickles) {
+      asio::steady_timer pause(io_, milliseconds(2));
+      co_await pause.async_wait(asio::as_tuple(asio::use_awaitable));
+      into[0] = 'a';
+      co_return rr::ReadResult{{}, 1};
+    }
     const auto cancels = cancels_;
     while (sent_.empty() && !is_closed && cancels == cancels_) co_await wait();
     if (sent_.empty()) co_return rr::ReadResult{asio::error::operation_aborted, 0};
@@ -62,6 +68,7 @@ class FakeClient final : public rr::ByteStream {
   std::string received;
   bool is_full = false;
   bool is_closed = false;
+  bool trickles = false;  ///< sends a byte now and then, each just before its reading is cancelled
 
  private:
   rr::awaitable<void> wait() { co_await changed_.async_wait(asio::as_tuple(asio::use_awaitable)); }
@@ -187,4 +194,40 @@ TEST_CASE("what a client sends while it is answered is its next request") {
     CHECK(next.request->path() == "/next");
   });
   CHECK_FALSE(exchange.client.is_closed);
+}
+
+TEST_CASE("a request is late though no reading of it was cancelled in time") {
+  asio::io_context io(1);
+  FakeClient client(io);
+  client.trickles = true;
+  RequestReader reader(client, {1000, milliseconds(100), milliseconds(100)});
+  std::optional<ReadRequest> read;
+  asio::co_spawn(
+      io, [&]() -> rr::awaitable<void> { read = co_await reader.next(); },
+      [](const std::exception_ptr& failure) {
+        if (failure) std::rethrow_exception(failure);
+      });
+  io.run_for(std::chrono::seconds(10));
+  REQUIRE(read);
+  CHECK_FALSE(read->request);
+  CHECK(read->failure.status == 408);
+}
+
+TEST_CASE("a client that sends much while its response goes on is taken for gone") {
+  Exchange exchange;
+  bool is_gone = false;
+  exchange.run([&]() -> rr::awaitable<void> {
+    Response head;
+    co_await exchange.writer.begin(head);
+    exchange.writer.watch([&] { is_gone = true; });
+    for (int i = 0; i < 5; ++i) exchange.client.send(std::string(4096, 'x'));
+    asio::steady_timer pause(exchange.io);
+    for (int i = 0; !is_gone && i < 100; ++i) {
+      pause.expires_after(milliseconds(10));
+      co_await pause.async_wait(asio::as_tuple(asio::use_awaitable));
+    }
+    exchange.client.close();
+    co_await exchange.writer.unwatch();
+  });
+  CHECK(is_gone);
 }

@@ -38,12 +38,15 @@ struct Outbox {
       waiting.push_back(std::move(text));
     }
     is_replaceable = replaces;
-    const bool is_slow = waiting.size() > 1 && bytes > max_waiting_bytes;  // one alone may be larger
-    if (is_slow || !memory.resize(in_flight + bytes)) {
+    // One alone may be larger: who keeps pace is not cut where others hold the memory.
+    const bool has_room = memory.resize(in_flight + bytes);
+    if (waiting.size() > 1 && (bytes > max_waiting_bytes || !has_room)) {
       waiting.clear();
       bytes = 0;
       waiting.push_back("event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n");
       is_over = true;
+    } else if (!has_room) {
+      memory.hold(in_flight + bytes);
     }
     news.cancel();
   }

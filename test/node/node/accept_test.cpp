@@ -108,6 +108,41 @@ TEST_CASE("a WebSocket that Beast has accepted is served, and ends with the node
   CHECK(error_of([&] { doubler.call("Stop"); }).code != ErrorCode::none);
 }
 
+TEST_CASE("a peer that takes what it is sent slowly, but takes it, is not given up") {
+  asio::io_context io;
+  tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.1"), 0});
+  acceptor.set_option(asio::socket_base::send_buffer_size(8 * 1024));
+  tcp::socket client(io, tcp::v4());
+  client.set_option(asio::socket_base::receive_buffer_size(8 * 1024));
+  client.connect(acceptor.local_endpoint());
+  beast::websocket::stream<beast::tcp_stream> server{beast::tcp_stream(acceptor.accept())};
+  beast::websocket::stream<tcp::socket> peer(std::move(client));
+  error_code failed = asio::error::would_block;
+  const auto serve = [&]() -> awaitable<void> {
+    co_await server.async_accept(await_tuple);
+    const auto stream = make_beast_stream(std::move(server), std::chrono::milliseconds(300));
+    const Bytes much(512 * 1024);
+    const ByteSpan slice(much);
+    failed = co_await stream->write(std::span(&slice, 1));
+    stream->close();
+  };
+  const auto take_slowly = [&]() -> awaitable<void> {
+    co_await peer.async_handshake("robot.lab", "/", await_tuple);
+    std::array<char, 4096> into{};
+    asio::steady_timer pause(io);
+    for (;;) {
+      pause.expires_after(std::chrono::milliseconds(10));
+      co_await pause.async_wait(await_tuple);
+      const auto [error, bytes] = co_await peer.async_read_some(asio::buffer(into), await_tuple);
+      if (error) break;
+    }
+  };
+  asio::co_spawn(io, serve, asio::detached);
+  asio::co_spawn(io, take_slowly, asio::detached);
+  io.run_for(std::chrono::seconds(20));
+  CHECK_FALSE(failed);
+}
+
 TEST_CASE("a connection is refused for a URL that is none, and let go by a node that stops") {
   asio::io_context io;
   Node node(io, "test.node");
