@@ -282,7 +282,7 @@ bool Access::sign_out(const Identity& who) {
 
 rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
   auto checked = state_->rules.check(who, what);
-  if (checked && is_recorded(what.verb)) return audit_->admit();
+  if (checked && is_recorded(what.verb) && !what.is_vital) return audit_->admit();
   if (!checked) record_refusal({.event = "refused", .who = &who, .what = &what, .outcome = Outcome::refused});
   return checked;
 }

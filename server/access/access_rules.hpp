@@ -50,6 +50,8 @@ struct AccessRequest {
   std::string_view member = {};   ///< empty: the object as such
   Verb verb = Verb::read;         ///< to read a device, a service or an object as such is to know of it
   bool is_shape = false;          ///< to read how large a memory is: also for those who may write it
+  /// Stops something, or keeps or gives back what is held: done also where it can't be recorded.
+  bool is_vital = false;
 };
 
 /// Gives everybody who has one of the roles all of `may` on whatever fits one pattern of each list. Patterns have '*'

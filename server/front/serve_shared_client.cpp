@@ -70,16 +70,25 @@ struct SharedPass : rr::RequestPass {
   AuditEntryPtr entry;
 };
 
+bool is_command(const rr::MemberAccess& wanted) {
+  return wanted.member &&
+         (wanted.type == rr::EntryType::function_call_req || wanted.type == rr::EntryType::property_set_req ||
+          wanted.type == rr::EntryType::wire_poke_out_value_req);
+}
+
 /// An emergency stop, and the like, or the end of a lease: it passes where others are refused because there were too
 /// many.
 bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
-  const bool is_command = wanted.type == rr::EntryType::function_call_req ||
-                          wanted.type == rr::EntryType::property_set_req ||
-                          wanted.type == rr::EntryType::wire_poke_out_value_req;
-  if (!is_command || !wanted.member) return false;
+  if (!is_command(wanted)) return false;
   if (device_name == gateway_device) return wanted.member->name == "release_lease";
   const auto* device = gateway.devices().find(device_name);
   return device && device->config().leases.is_urgent(std::string(wanted.path) + "." + wanted.member->name);
+}
+
+/// See AccessRequest.
+bool is_vital(GatewayState& gateway, const SharedNode& node, const rr::MemberAccess& wanted) {
+  const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+  return is_urgent(gateway, device, wanted) || (device == gateway_device && wanted.member->name == "renew_lease");
 }
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
@@ -140,7 +149,7 @@ auto make_admission(GatewayState& gateway, const SharedNode& node, std::string p
           seating = std::move(seating)](const rr::MemberAccess& wanted) -> rr::Result<> {
     const bool connects =
         wanted.type == rr::EntryType::connect_client || wanted.type == rr::EntryType::connect_client_combined;
-    auto allowed = rights->admit(wanted);
+    auto allowed = rights->admit(wanted, is_command(wanted) && is_vital(gateway, node, wanted));
     if (!connects) return allowed;
     if (!allowed)
       gateway.reject(allowed.error());

@@ -118,7 +118,7 @@ rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAc
                         "who is not logged in may not use service " + rr::quote(service));
 }
 
-rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
+rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted, bool is_vital) {
   if (access_.is_open() && !access_.audit().is_used()) return {};
   auto& asker = standing_of(wanted.user);
   if (wanted.type == rr::EntryType::get_node_info)
@@ -136,6 +136,7 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   if (wanted.member) request.member = wanted.member->name;
   request.verb = verb_of(wanted.type, wanted.member);
   request.is_shape = wanted.type == rr::EntryType::memory_get_param;
+  request.is_vital = is_vital;
   return asker.check(request, recorded_of(wanted.type));
 }
 

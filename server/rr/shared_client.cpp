@@ -394,7 +394,7 @@ rr::Result<> SharedClient::admit_lock(const rr::LockWanted& wanted) {
                           wanted.command == rr::LockCommand::exit_monitor ||
                           wanted.command == rr::LockCommand::release_lease;
   if (!rights_.admit || (gives_back && home_->has_lock(*this, wanted.path))) return {};
-  return rights_.admit(wanted.path, session_.user(), true);
+  return rights_.admit(wanted.path, session_.user(), wanted.command != rr::LockCommand::renew_lease);
 }
 
 bool SharedClient::may_lock(const std::string& path) const {

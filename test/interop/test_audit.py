@@ -12,6 +12,7 @@ import websockets.sync.client
 
 from gateways import RRGATE, Gateway, rrgate
 from http_api import BASE, JSON_PROTOCOL, Stream, ask
+from json_sockets import Socket
 from users import PASSWORDS, RULES, basic, bearer, make_users
 
 CLIENT_LOCK = RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK
@@ -28,11 +29,11 @@ def records(path):
 class Site:
     """A gateway to one device, shared and relayed, whose audit log is read along."""
 
-    def __init__(self, folder, device, audit={}, **more):
+    def __init__(self, folder, device, audit={}, leases={}, **more):
         make_users(folder)
         self.folder, self.file, self.read = folder, folder / "audit", 0
         self.token = rrgate("token", folder / "tokens", "ci", "--roles", "admin")
-        devices = [{"name": "interop", "url": device, "mode": "shared"}, {"name": "relayed", "url": device}]
+        devices = [{"name": "interop", "url": device, "mode": "shared", "leases": leases}, {"name": "relayed", "url": device}]
         self.gateway = Gateway(folder, {"devices": devices, "audit": {"file": "audit", **audit}, "node": {"name": "lab.gateway"},
                                         "access": {"users_file": "users", "tokens_file": "tokens", "rules": RULES}}, **more)
         self.port = self.gateway.port
@@ -329,9 +330,18 @@ def limit_files(site, size):
 
 
 @pytest.mark.parametrize("is_closed", [False, True])
-def test_a_disk_that_is_full_and_has_room_again(device, tmp_path, is_closed):
-    site = Site(tmp_path, device, {"fail_closed": is_closed}, command=["env", "--ignore-signal=XFSZ"])
+def test_a_disk_that_is_full_and_has_room_again(device, node, tmp_path, is_closed):
+    site = Site(tmp_path, device, {"fail_closed": is_closed}, {"members": [{"member": "interop.p_int8", "lease": "never"}]},
+                command=["env", "--ignore-signal=XFSZ"])
+    login = ("root", {"password": RR.VarValue(PASSWORDS["root"], "string")}, None, None)
+    arm = node.ConnectService(site.url("rr+tcp"), *login)
+    leases = node.ConnectService(f"rr+tcp://127.0.0.1:{site.port}/?nodename=lab.gateway&service=gateway", *login)
     try:
+        session = node.GetServiceAttributes(arm)["rrgate.session"].data
+        leases.acquire_lease(session, "interop.parts[8]", 20_000)
+        taken = ask(site.port, "POST", BASE + "/parts/7?lease=acquire&deadman=20000", headers=bearer(site.token)).json["lease"]
+        mine = {"Rrgate-Lease": taken, **bearer(site.token)}
+
         def write():
             return ask(site.port, "PUT", BASE + "/p_double", 1.5, bearer(site.token))
 
@@ -353,6 +363,18 @@ def test_a_disk_that_is_full_and_has_room_again(device, tmp_path, is_closed):
             stream = ask(site.port, "GET", BASE + "/both", headers={"Accept": "text/event-stream", **bearer(site.token)})
             assert stream.status == 503
             assert re.search(r'rrgate_rejected_total\{reason="audit"\} [1-9]', metrics)
+            assert ask(site.port, "POST", BASE + "?lease=acquire", headers=bearer(site.token)).status == 503
+            with pytest.raises(RR.RobotRaconteurException, match="can't write its audit log"):
+                arm.p_double = 2.5
+        # What stops something, keeps a lease or gives it back, is done in any case.
+        arm.p_int8 = 1
+        assert ask(site.port, "PUT", BASE + "/p_int8", 2, bearer(site.token)).status == 204
+        with Socket(site.port, additional_headers=bearer(site.token)) as page:
+            assert page.ask("set", "p_int8", value=3) is None
+        leases.renew_lease(session, "interop.parts[8]")
+        leases.release_lease(session, "interop.parts[8]")
+        assert ask(site.port, "POST", BASE + "/parts/7?lease=renew", headers=mine).status == 204
+        assert ask(site.port, "POST", BASE + "/parts/7?lease=release", headers=mine).status == 204
         limit_files(site, resource.RLIM_INFINITY)
         site.gateway.wait_for("audit log can be written again")
         assert write().status == 204
@@ -361,6 +383,8 @@ def test_a_disk_that_is_full_and_has_room_again(device, tmp_path, is_closed):
         assert resumed["detail"].startswith("File too large for ") and "0 records were lost" in resumed["detail"]
         assert ("0 requests refused" in resumed["detail"]) != is_closed
     finally:
+        for service in (arm, leases):
+            node.DisconnectService(service)
         site.stop()
     verify(site.file)
 
