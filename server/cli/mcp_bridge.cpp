@@ -29,7 +29,7 @@ constexpr int resource_not_found = -32002;
 constexpr const char* listening_revision = "2026-07-28";
 /// After a cut; twice as long each time, until something is told: the gateway records each refusal.
 constexpr std::chrono::seconds first_pause{1};
-constexpr std::chrono::seconds longest_pause{300};
+constexpr std::chrono::seconds longest_pause{60};
 
 /// What a member of an object says as text; empty where it is none.
 std::string text_in(const rr::Json& json, std::initializer_list<const char*> keys) {
