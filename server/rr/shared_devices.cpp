@@ -27,10 +27,11 @@ std::string node_name_of(const std::string& device) {
 }  // namespace
 
 SharedDevice::SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config,
-                           Logins& logins)
+                           Logins& logins, std::function<void()> name_is_free)
     : device_(std::move(device)),
       gateway_node_(gateway_node),
       config_(config),
+      name_is_free_(std::move(name_is_free)),
       node_({derived_id(gateway_node.identity().id, device_->config().name), node_name_of(device_->config().name)},
             config, logins) {
   device_->on_change([this] { refresh(); });
@@ -50,6 +51,7 @@ void SharedDevice::refresh() {
     return std::any_of(identity->services.begin(), identity->services.end(),
                        [&](const DeviceService& service) { return service.name == name; });
   };
+  const auto before = services_.size();
   for (auto it = services_.begin(); it != services_.end();) {
     auto& service = *it->second;
     service.set_listed(has(it->first));
@@ -61,6 +63,7 @@ void SharedDevice::refresh() {
     service.stop();
     it = services_.erase(it);
   }
+  const bool have_gone = services_.size() < before;
   for (const auto& service : identity->services) {
     if (service.name == rr::service_index_name || services_.contains(service.name)) continue;
     const std::vector<ServiceBoard*> boards{&node_, &gateway_node_};
@@ -68,6 +71,7 @@ void SharedDevice::refresh() {
     services_.emplace(service.name, shared);
     shared->start(config_.timeouts.unused_session);
   }
+  if (have_gone) name_is_free_();
 }
 
 bool SharedDevice::is_ready() const {
@@ -84,10 +88,17 @@ SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config, Logins&
     : config_(config), logins_(logins), node_({id, config.node.name}, config, logins) {}
 
 void SharedDevices::sync(const DeviceRegistry& devices) {
-  std::erase_if(devices_, [&](const auto& each) { return !devices.has(*each.first); });
+  const auto have_gone = std::erase_if(devices_, [&](const auto& each) { return !devices.has(*each.first); });
+  if (have_gone > 0) offer_again();
   for (const auto& device : devices.all())
     if (device->is_shared() && !devices_.contains(device.get()))
-      devices_.emplace(device.get(), std::make_unique<SharedDevice>(device, node_, config_, logins_));
+      devices_.emplace(device.get(),
+                       std::make_unique<SharedDevice>(device, node_, config_, logins_, [this] { offer_again(); }));
+}
+
+void SharedDevices::offer_again() {
+  for (const auto& [key, device] : devices_)
+    for (const auto& [name, service] : device->services()) service->offer_again();
 }
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {

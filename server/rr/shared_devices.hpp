@@ -14,8 +14,10 @@ namespace rrgate {
 /// The services of one device, kept open as long as it lives.
 class SharedDevice {
  public:
-  /// The other arguments outlive it.
-  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config, Logins& logins);
+  /// The other arguments outlive it. `name_is_free`  is called when services have gone, whose names others may wait
+  /// for.
+  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config, Logins& logins,
+               std::function<void()> name_is_free);
   ~SharedDevice();
 
   SharedNode& node() { return node_; }
@@ -32,6 +34,7 @@ class SharedDevice {
   std::shared_ptr<Device> device_;
   SharedNode& gateway_node_;
   const Config& config_;
+  std::function<void()> name_is_free_;
   SharedNode node_;
   std::map<std::string, std::shared_ptr<SharedService>> services_;
 };
@@ -76,6 +79,9 @@ class SharedDevices {
   }
 
  private:
+  /// Services whose names others had on the gateway's node.
+  void offer_again();
+
   const Config& config_;
   Logins& logins_;
   SharedNode node_;

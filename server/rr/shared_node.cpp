@@ -37,15 +37,21 @@ void SharedNode::close() {
 }
 
 void SharedNode::publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) {
+  if (const auto known = services_.find(hosted->name());
+      known != services_.end() && known->second.first == hosted.get())
+    return;
   if (const auto added = directory_.add(hosted); !added) {
+    if (!refused_.insert(hosted.get()).second) return;
     log(LogLevel::info, "a service is not offered on the gateway's own node: its name is taken there",
         {{"service", hosted->name()}, {"device", service.device()->config().name}});
     return;
   }
+  refused_.erase(hosted.get());
   services_[hosted->name()] = {hosted.get(), service.weak_from_this()};
 }
 
 void SharedNode::withdraw(const rr::HostedService& hosted) {
+  refused_.erase(&hosted);
   const auto found = services_.find(hosted.name());
   if (found == services_.end() || found->second.first != &hosted) return;
   services_.erase(found);

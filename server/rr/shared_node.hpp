@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "server/limits/memory_budget.hpp"
@@ -61,6 +62,7 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
   Logins& logins_;
   rr::ServiceDirectory directory_;
   std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
+  std::set<const rr::HostedService*> refused_;  ///< their names are taken, and that was told
   std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
   std::map<SharedClient*, std::function<void()>> ended_;
 };

@@ -110,8 +110,13 @@ rr::Result<> SharedService::publish() {
   hosted_ = std::move(*hosted);
   hosted_->set_remote();
   renew_judge();
-  for (auto* board : boards_) board->publish(hosted_, *this);
+  offer_again();
   return {};
+}
+
+void SharedService::offer_again() {
+  if (!hosted_) return;
+  for (auto* board : boards_) board->publish(hosted_, *this);
 }
 
 void SharedService::renew_judge() {

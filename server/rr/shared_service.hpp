@@ -23,7 +23,7 @@ class ServiceBoard {
  public:
   /// Who judges logins; null: the device does.
   virtual std::shared_ptr<const rr::Authenticator> authenticator() const = 0;
-  /// Where the name is taken already, the service is not offered there.
+  /// Where the name is taken already, the service is not offered there. Does nothing where it is offered already.
   virtual void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) = 0;
   virtual void withdraw(const rr::HostedService& hosted) = 0;
 
@@ -42,6 +42,8 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// Whether the device says that it has the service. Where not, it is offered to nobody until it can be opened again,
   /// and given up with the last one who waits for it.
   void set_listed(bool is_listed);
+  /// Offers the service once more where its name was taken.
+  void offer_again();
   /// Has logins judged by whoever the boards name now.
   void renew_judge();
 
