@@ -151,8 +151,10 @@ rr::Result<std::shared_ptr<Upstream>> Device::find_shared(const std::string& ser
 }
 
 std::shared_ptr<ServiceLocks> Device::locks_of(const std::string& service) {
-  auto locks = locks_[service].lock();
-  if (!locks) locks_[service] = locks = std::make_shared<ServiceLocks>(*this, service);
+  std::erase_if(locks_, [](const auto& known) { return known.second.expired(); });  // clients choose the names
+  auto& known = locks_[service];
+  auto locks = known.lock();
+  if (!locks) known = locks = std::make_shared<ServiceLocks>(*this, service);
   std::erase_if(owing_, [](const auto& each) { return !each->is_owing(); });
   return locks;
 }

@@ -1,5 +1,5 @@
-// A gateway that gets no memory for one request: the request fails, the gateway goes on. It replaces operator new, so
-// it is a program of its own.
+// A gateway that gets no memory for one request: the request fails, the gateway goes on; and what takes memory only as
+// long as it is used. It replaces operator new, so it is a program of its own.
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "server/upstream/service_locks.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/server/support/test_gateway.hpp"
 
@@ -16,19 +17,22 @@ using namespace rrgate::test;
 namespace {
 
 std::atomic<std::size_t> failing_from = SIZE_MAX;  ///< bytes that are not to be had
+std::atomic<long> live = 0;                        ///< pieces of memory that are held
 
 }  // namespace
 
 void* operator new(std::size_t size) {
   void* memory = size < failing_from ? std::malloc(size == 0 ? 1 : size) : nullptr;
   if (!memory) throw std::bad_alloc();
+  ++live;
   return memory;
 }
 void operator delete(void* memory) noexcept {
+  if (memory) --live;
   std::free(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  ::operator delete(memory);
 }
 
 namespace {
@@ -84,4 +88,14 @@ TEST_CASE(
   }
   failing_from = SIZE_MAX;
   CHECK(get(client, ++id, "one")["result"] == 1);
+}
+
+TEST_CASE("services that clients have named and use no more take no memory") {
+  boost::asio::io_context io;
+  const Config config;
+  const auto device = std::make_shared<Device>(io.get_executor(), DeviceConfig{}, config);
+  device->locks_of("the first");
+  const auto before = live.load();
+  for (int i = 0; i < 1000; ++i) device->locks_of("service" + std::to_string(i));
+  CHECK(live.load() - before < 100);
 }
