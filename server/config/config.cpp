@@ -95,6 +95,7 @@ void read_timeouts(ObjectReader& in, Timeouts& timeouts) {
   in.duration("send_stall_ms", timeouts.send_stall, {100, hour_ms});
   in.duration("idle_ms", timeouts.idle, {100, hour_ms});
   in.duration("unused_session_ms", timeouts.unused_session, {0, hour_ms});
+  in.duration("request_ms", timeouts.request, {100, hour_ms});
 }
 
 void read_retry(ObjectReader& in, Retry& retry) {

@@ -157,6 +157,7 @@ struct Timeouts {
   milliseconds send_stall{15000};      ///< a peer that takes no byte for so long is cut
   milliseconds idle{60000};            ///< a kept-alive HTTP connection without a request
   milliseconds unused_session{60000};  ///< of a shared device, before it ends; 0: it is kept
+  milliseconds request{60000};         ///< for a device to answer what the gateway asks it in a session of its own
 
   bool operator==(const Timeouts&) const = default;
 };

@@ -80,6 +80,7 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
            : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
                                     : nullptr),
       retry_(whole.retry),
+      request_timeout_(whole.timeouts.request),
       backoff_(retry_.min, retry_.max),
       look_id_(rr::random_node_id()),
       wake_(executor) {
@@ -180,6 +181,7 @@ void Device::become(const DeviceConfig& config, const Config& whole) {
   config_.shares_reads = config.shares_reads;
   dial_options_.timeout = whole.timeouts.connect;
   dial_options_.send_stall = whole.timeouts.send_stall;
+  request_timeout_ = whole.timeouts.request;
   if (retry_ == whole.retry) return;
   retry_ = whole.retry;
   backoff_ = rr::Backoff(retry_.min, retry_.max);

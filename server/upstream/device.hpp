@@ -71,6 +71,8 @@ class Device : public std::enable_shared_from_this<Device> {
   /// Errors   service_not_found; connection_error: the device has not answered yet.
   rr::Result<std::shared_ptr<Upstream>> find_shared(const std::string& service) const;
   const Retry& retry() const { return retry_; }
+  /// How long it may take to answer a request; see Timeouts.
+  std::chrono::milliseconds request_timeout() const { return request_timeout_; }
   /// Of one service, for all sessions that the gateway has with it.
   std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
   /// Keeps the locks of a service that nobody uses, as long as they owe the device what makes it safe.
@@ -146,6 +148,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
+  std::chrono::milliseconds request_timeout_;
   rr::Backoff backoff_;             ///< between looks at it while it does not answer
   std::shared_ptr<LookPace> pace_;  ///< of all devices; may be null
   const rr::NodeId look_id_;        ///< the node that looks come from: none but they have it

@@ -418,7 +418,9 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
   const auto index = found->second.index;
   if (called.kind == rr::CallKind::generator_next) {
     auto stepped = [weak = weak_from_this(), key, life, done = std::move(done)](rr::Result<rr::Value> value) {
-      if (const auto self = weak.lock(); self && !value && !life.expired()) self->generators_.erase(key);
+      // One that takes too long is still at work there, and is to be ended.
+      const bool has_ended = !value && value.error().code != rr::ErrorCode::request_timeout;
+      if (const auto self = weak.lock(); self && has_ended && !life.expired()) self->generators_.erase(key);
       done(std::move(value));
     };
     std::optional<rr::Value> parameter;

@@ -92,6 +92,7 @@ rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_
   const auto& url = device_->config().url;
   rr::ClientOptions options;
   options.service = service_;
+  options.request_timeout = device_->request_timeout();
   options.connection.self.name = "rrgate";
   options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
   if (is_stepwise) options.connection.features.combined_v2 = options.connection.features.combined_v4 = false;

@@ -23,6 +23,7 @@ NATIVE = {
     "limits.max_message_size": "a message above the limit closes that connection alone",
     "limits.outbox_bytes": "while one side takes nothing, the relay takes no more from the other than it may hold",
     "timeouts.idle_ms": "silent, half-open and idle connections are closed",
+    "timeouts.request_ms": "a device that takes too long has the time for its answer that the configuration gives it",
 }
 
 

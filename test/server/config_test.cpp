@@ -280,7 +280,8 @@ TEST_CASE("every option arrives") {
     "allowed_hosts": ["mybox.local", "*.lab.example"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
                "clients": 5, "clients_per_address": 6, "memory": 50000000, "client_queue_bytes": 70000, "opaque_rate": 7000},
-    "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104, "unused_session_ms": 105},
+    "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104, "unused_session_ms": 105,
+                 "request_ms": 106},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
     "recordings": {"folder": "recordings", "max_bytes": 5000000, "at_once": 2,
                    "record": [{"device": "a", "service": "s", "members": ["x", "y/*"], "interval_ms": 50,
@@ -320,8 +321,8 @@ TEST_CASE("every option arrives") {
   CHECK(config.allowed_origins.size() == 2);
   CHECK(config.allowed_hosts == std::vector<std::string>{"mybox.local", "*.lab.example"});
   CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 50000000, 70000, 7000});
-  CHECK(config.timeouts ==
-        Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104), milliseconds(105)});
+  CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104),
+                                    milliseconds(105), milliseconds(106)});
   CHECK(config.recordings.folder == "recordings");
   CHECK(config.recordings.max_bytes == 5'000'000);
   CHECK(config.recordings.at_once == 2);

@@ -1,5 +1,6 @@
 // What a device says and what its readers leave waiting, as clients by HTTP see it: statuses of errors, event streams.
 #include <catch2/catch.hpp>
+#include <thread>
 
 #include "test/node/node/node_fixture.hpp"
 #include "test/server/support/test_gateway.hpp"
@@ -12,16 +13,25 @@ namespace {
 
 struct Robot {
   std::shared_ptr<rr::Service> service;
+  bool is_closed = false;  ///< the generator whose values come late
+  std::vector<std::shared_ptr<rr::LateCall>> late;
   rr::RunningNode node;
 
   explicit Robot(const rr::SecurityPolicy& policy = {})
       : service(rr::Service::from_text({"service test.robot\nobject Robot\nproperty int32 one [readonly]\n"
-                                        "function void fail(uint16 code)\nevent news(string text)\nend\n"},
+                                        "function void fail(uint16 code)\nfunction int32{generator} hang()\n"
+                                        "event news(string text)\nend\n"},
                                        "Robot", "Robot")),
         node([this, &policy](rr::Node& made) {
           service->property("one").get([] { return 1; });
           service->function("fail", [](std::uint16_t code) {
             throw rr::ServiceException("as asked", static_cast<rr::ErrorCode>(code));
+          });
+          service->generator("hang", [this] {
+            rr::Generator generator;
+            generator.close = [this] { is_closed = true; };
+            generator.start = [this](rr::Value, const std::shared_ptr<rr::LateCall>& call) { late.push_back(call); };
+            return generator;
           });
           service->set_security(policy);
           made.add(service);
@@ -83,6 +93,28 @@ TEST_CASE("errors of a device have the status of their kind over HTTP") {
       CHECK(status_of_failure(client, code) == status);
     }
   }
+}
+
+TEST_CASE("a generator whose value comes too late for HTTP is ended at the device") {
+  Robot robot;
+  TestGateway gateway(0, [&](Config& config) {
+    with(robot)(config);
+    config.timeouts.request = 200ms;
+  });
+  TestClient client(gateway.port());
+  client.send(
+      "POST /api/v1/devices/robot/Robot/hang HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+      "Content-Length: 2\r\n\r\n{}");
+  CHECK_THAT(client.receive_until("\n\r\n0\r\n\r\n"), Catch::Contains("RequestTimeout"));
+  const auto end = std::chrono::steady_clock::now() + 10s;
+  const auto is_closed = [&] {
+    return robot.node.ask([&](rr::Node&) {
+      for (const auto& call : std::exchange(robot.late, {})) call->answer(rr::Value(std::int32_t{1}));
+      return robot.is_closed;
+    });
+  };
+  while (!is_closed() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  CHECK(is_closed());
 }
 
 TEST_CASE("an event stream without news says that it lives") {

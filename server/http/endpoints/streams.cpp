@@ -237,7 +237,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     const auto framed = !as_events ? text + "\n" : (has_ended ? "event: error\n" : "") + ("data: " + text + "\n\n");
     failed = co_await writer.write(framed);
   }
-  if (!has_ended) target.client->drop_generator(generator);
+  target.client->drop_generator(generator);
   if (!failed && !*gone) co_await writer.end();
   co_await writer.unwatch();
 }

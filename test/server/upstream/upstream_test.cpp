@@ -72,6 +72,30 @@ class Believing final : public rr::Authenticator {
   }
 };
 
+/// A generator whose values come late.
+struct Hanging {
+  int asked = 0;
+  int closed = 0;
+  int aborted = 0;
+  std::vector<std::shared_ptr<rr::LateCall>> calls;
+
+  explicit Hanging(rr::Service& service) {
+    service.generator("count", [this] {
+      rr::Generator made;
+      made.start = [this](rr::Value, const std::shared_ptr<rr::LateCall>& call) {
+        ++asked;
+        calls.push_back(call);
+      };
+      made.close = [this] { ++closed; };
+      made.abort = [this] { ++aborted; };
+      return made;
+    });
+  }
+  void answer() {
+    for (const auto& call : std::exchange(calls, {})) call->answer(rr::Value(std::int32_t{1}));
+  }
+};
+
 LeaseConfig leases_with_stop() {
   LeaseConfig leases;
   leases.is_offered = true;
@@ -90,6 +114,13 @@ void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream,
   upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
   REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
   REQUIRE(*is_held);
+}
+
+/// What the gateway asks in sessions that are opened from now on is answered within this time, or it has failed.
+void answer_within(UpstreamBench& bench, std::chrono::milliseconds timeout) {
+  bench.config.timeouts.request = timeout;
+  const auto config = bench.device->config();
+  bench.device->become(config, bench.config);
 }
 
 void cut(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream) {
@@ -277,6 +308,46 @@ TEST_CASE("a generator that opens when its client has gone is nobody else's") {
   REQUIRE(bench.run_until([&] { return next->has_value(); }));
   REQUIRE_FALSE((**next).has_value());
   CHECK((*next)->error().code == rr::ErrorCode::invalid_operation);
+}
+
+TEST_CASE("a device that takes too long has the time for its answer that the configuration gives it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  answer_within(bench, 100ms);
+  bench.open();
+  HearingClient client(bench.upstream);
+  const auto asked = bench.ask(client, rr::CallKind::function, "bench", "wait");
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  REQUIRE_FALSE((**asked).has_value());
+  CHECK((*asked)->error().code == rr::ErrorCode::request_timeout);
+}
+
+TEST_CASE("a generator whose value comes too late is the client's still, to be ended at the device") {
+  Counting device;
+  Hanging hanging(*device.service);
+  UpstreamBench bench(device.service);
+  answer_within(bench, 200ms);
+  bench.open();
+  std::optional<HearingClient> client(std::in_place, bench.upstream);
+  const auto opened = bench.ask(*client, rr::CallKind::generator_open, "bench", "count", 1);
+  REQUIRE(bench.run_until([&] { return opened->has_value(); }));
+  const auto next = bench.ask(*client, rr::CallKind::generator_next, "bench", "count", 1);
+  REQUIRE(bench.run_until([&] { return next->has_value(); }));
+  REQUIRE(hanging.asked == 1);
+  REQUIRE_FALSE((**next).has_value());
+  CHECK((*next)->error().code == rr::ErrorCode::request_timeout);
+  SECTION("by the client") {
+    const auto aborted = bench.ask(*client, rr::CallKind::generator_abort, "bench", "count", 1);
+    REQUIRE(bench.run_until([&] { return aborted->has_value(); }));
+    CHECK((**aborted).has_value());
+    CHECK(hanging.aborted == 1);
+  }
+  SECTION("when the client leaves") {
+    client.reset();
+    bench.find("bench.others[1]");
+    hanging.answer();  // until then it is not closed
+    CHECK(bench.run_until([&] { return hanging.closed == 1; }));
+  }
 }
 
 TEST_CASE("what a device was asked when its service ended is told to be lost with the connection") {
