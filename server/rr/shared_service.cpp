@@ -57,14 +57,21 @@ SharedService::SharedService(std::shared_ptr<Device> device, std::string name, s
 }
 
 std::shared_ptr<Upstream> SharedService::make_own_upstream(UpstreamLogin login) const {
-  return std::make_shared<Upstream>(device_, name_, std::move(login), UpstreamUse::one_client);
+  auto upstream = std::make_shared<Upstream>(device_, name_, std::move(login), UpstreamUse::one_client);
+  forget_released(*upstream);
+  return upstream;
+}
+
+/// Objects that one session finds to be others now are not offered as what they were, whoever had found them.
+void SharedService::forget_released(Upstream& upstream) const {
+  upstream.on_released([weak = weak_from_this()](const std::string& path) {
+    if (const auto self = weak.lock(); self && self->hosted_) self->hosted_->forget_path(path);
+  });
 }
 
 void SharedService::start(std::chrono::milliseconds rests_after) {
   upstream_->rest_unused(rests_after);
-  upstream_->on_released([weak = weak_from_this()](const std::string& path) {
-    if (const auto self = weak.lock(); self && self->hosted_) self->hosted_->forget_path(path);
-  });
+  forget_released(*upstream_);
   upstream_->keep_open(device_->retry(), [weak = weak_from_this()] {
     const auto self = weak.lock();
     return self ? self->publish() : rr::Result<>();
@@ -162,9 +169,12 @@ void SharedService::find_object(Upstream& by, const std::string& path, std::func
     const auto found_by = finder.lock();
     if (!self || !self->hosted_) return;  // whoever asked has been told that the service is gone
     if (!found) return done(found.error());
-    if (found_by && found_by != self->upstream_)
+    const std::string type(found->to_text().value());
+    if (found_by && found_by != self->upstream_) {
       if (auto taken = self->upstream_->take_over_definitions(*found_by->types()); !taken) return done(taken.error());
-    done(self->hosted_->add_object(path, std::make_shared<SharedObject>(path, std::string(found->to_text().value()))));
+      self->upstream_->note_object(path, type);
+    }
+    done(self->hosted_->add_object(path, std::make_shared<SharedObject>(path, type)));
   });
 }
 

@@ -70,6 +70,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   void add_traffic(Traffic& traffic) const;
 
  private:
+  void forget_released(Upstream& upstream) const;
   rr::Result<> publish();
   void withdraw();
 

@@ -17,11 +17,6 @@ rr::Error misfit(const SafeAction& action, const std::string& why) {
                         "safe value " + rr::quote(action.path + "." + action.member) + " of the gateway: " + why);
 }
 
-/// Of a session that may do less than the one which found the object.
-bool is_refusal(const rr::Error& error) {
-  return error.code == rr::ErrorCode::authentication_error || error.code == rr::ErrorCode::permission_denied;
-}
-
 rr::MemberKind member_kind(SafeAction::Kind kind) {
   return kind == SafeAction::Kind::call   ? rr::MemberKind::function
          : kind == SafeAction::Kind::wire ? rr::MemberKind::wire
@@ -72,24 +67,29 @@ SafeValues::SafeValues(std::string device, std::string_view service, const std::
 }
 
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
-  for (std::size_t i = 0; i < items_.size(); ++i) {
-    auto& item = items_[i];
-    if (upstream->object_type(item.action.path)) {
-      read(item, *upstream);
-      continue;
-    }
-    upstream->find_object(item.action.path, [weak = weak_from_this(), i, upstream](const rr::Result<rr::Value>& found) {
-      const auto self = weak.lock();
-      if (!self) return;
-      auto& wanted = self->items_[i];
-      if (found)
-        self->read(wanted, *upstream);
-      else if (upstream->is_open() && !(wanted.request && is_refusal(found.error())))
-        self->take(wanted, misfit(wanted.action, found.error().message));
-      self->pay(upstream);
-    });
-  }
+  for (std::size_t i = 0; i < items_.size(); ++i) look_up(i, upstream);
   pay(upstream);
+}
+
+void SafeValues::check_again(std::string_view path, const std::shared_ptr<Upstream>& upstream) {
+  for (std::size_t i = 0; i < items_.size(); ++i)
+    if (rr::is_within(items_[i].action.path, path)) look_up(i, upstream);
+}
+
+void SafeValues::look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream) {
+  auto& item = items_[index];
+  if (upstream->object_type(item.action.path)) return read(item, *upstream);
+  auto looked_up = [weak = weak_from_this(), index, upstream](const rr::Result<rr::Value>& found) {
+    const auto self = weak.lock();
+    if (!self) return;
+    auto& wanted = self->items_[index];
+    if (found)
+      self->read(wanted, *upstream);
+    else if (upstream->is_open() && !(wanted.request && is_refusal(found.error())))
+      self->take(wanted, misfit(wanted.action, found.error().message));
+    self->pay(upstream);
+  };
+  upstream->find_object(item.action.path, std::move(looked_up));
 }
 
 void SafeValues::read(Item& item, Upstream& upstream) {
@@ -98,8 +98,9 @@ void SafeValues::read(Item& item, Upstream& upstream) {
 }
 
 void SafeValues::take(Item& item, rr::Result<SafeRequest> request) {
+  const bool is_known = !request && !item.request && request.error().message == item.request.error().message;
   item.request = std::move(request);
-  if (!item.request)
+  if (!item.request && !is_known)
     log(LogLevel::error, "no leases where this would have to be safe",
         {{"device", device_}, {"error", item.request.error().message}});
 }

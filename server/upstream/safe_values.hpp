@@ -32,6 +32,8 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   /// A session with the device is open: what the configuration says is held against what the device declares, and what
   /// could not be sent before is sent.
   void handle_opened(const std::shared_ptr<Upstream>& upstream);
+  /// The same for what is at and below a path, where objects may be others now.
+  void check_again(std::string_view path, const std::shared_ptr<Upstream>& upstream);
   /// Whether the device can be made safe at and below a path. Errors   invalid_configuration: what does not fit.
   rr::Result<> check(std::string_view path) const;
   /// Whether there are any at or below a path.
@@ -50,6 +52,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
     rr::Result<SafeRequest> request;
   };
 
+  void look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream);
   void read(Item& item, Upstream& upstream);
   void take(Item& item, rr::Result<SafeRequest> request);
   void pay(const std::shared_ptr<Upstream>& upstream);

@@ -151,7 +151,11 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
     if (takes_over && std::none_of(config.takeover.begin(), config.takeover.end(), may_take))
       return rr::make_error(rr::ErrorCode::permission_denied,
                             "this client has none of the roles that may take a lease over (\"takeover\")");
-    if (auto fits = safe_->check(canonical_lock_path(wanted.path)); !fits) return fits;
+    if (auto fits = safe_->check(canonical_lock_path(wanted.path)); !fits) {
+      // Objects may have come since, of which the device tells nobody: who asks again finds that out.
+      if (const auto upstream = open_upstream(client.upstream_in_use())) check_safe_values(wanted.path, upstream);
+      return fits;
+    }
     if (auto allowed = table_.check(id, wanted.path, false, now); !allowed) return allowed;
     if (auto allowed = table_.check_below(id, wanted.path); !allowed) return allowed;
     result = leases_.acquire(id, client.lock_user(), wanted.path, wanted.timeout, takes_over, now);
@@ -243,6 +247,11 @@ void ServiceLocks::handle_lost(const Upstream& upstream) {
 void ServiceLocks::handle_released(std::string_view path) {
   table_.handle_released(path, steady_now());
   settle();
+}
+
+void ServiceLocks::check_safe_values(std::string_view path, const std::shared_ptr<Upstream>& upstream) {
+  if (device_.config().leases.is_offered && upstream->may_act())
+    safe_->check_again(canonical_lock_path(path), upstream);
 }
 
 void ServiceLocks::settle() {

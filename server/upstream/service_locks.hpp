@@ -73,6 +73,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void handle_lost(const Upstream& upstream);
   /// The device has replaced the objects at and below a path.
   void handle_released(std::string_view path);
+  /// Holds what makes safe there against what the device has now.
+  void check_safe_values(std::string_view path, const std::shared_ptr<Upstream>& upstream);
 
  private:
   struct Holder {

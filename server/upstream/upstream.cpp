@@ -40,12 +40,20 @@ bool ends_generator(const rr::Called& called) {
   return called.kind == rr::CallKind::generator_close || called.kind == rr::CallKind::generator_abort;
 }
 
+rr::Error session_has_ended() {
+  return rr::make_error(rr::ErrorCode::connection_error, "the session with the device has ended");
+}
+
 /// The object of a call: hosted services of shared devices have no others.
 const std::string& path_of(const rr::Called& called) {
   return static_cast<const SharedObject&>(*called.object).path();
 }
 
 }  // namespace
+
+bool is_refusal(const rr::Error& error) {
+  return error.code == rr::ErrorCode::authentication_error || error.code == rr::ErrorCode::permission_denied;
+}
 
 Upstream::Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login, UpstreamUse use)
     : device_(std::move(device)),
@@ -146,7 +154,7 @@ void Upstream::find_object(const std::string& path, Completion done) {
   find_object(parent, [weak = weak_from_this(), path, done = std::move(done)](const rr::Result<rr::Value>& found) {
     const auto self = weak.lock();
     if (!found) return done(found);
-    if (!self) return done(rr::make_error(rr::ErrorCode::connection_error, "the session with the device has ended"));
+    if (!self) return done(session_has_ended());
     self->look_up(path, done);
   });
 }
@@ -185,7 +193,7 @@ void Upstream::look_up(const std::string& path, Completion done) {
 
 /// Events and callbacks of an object reach all clients, whether or not they ever looked at it.
 void Upstream::watch_object(const std::string& path, const rr::EntityDefinition& type) {
-  objects_.insert(path);
+  objects_[path] = type.qualified_name;
   for (const auto& member : type.members) {
     if (member.kind == rr::MemberKind::event) {
       connection_->on_event(
@@ -207,31 +215,41 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
   }
 }
 
+void Upstream::note_object(const std::string& path, const std::string& type) {
+  if (objects_.size() < max_objects) objects_.try_emplace(path, type);
+}
+
 /// After the device has come back: what clients had found there, they have found again, or it is gone.
 void Upstream::look_up_again() {
   auto known = objects_;
-  for (const auto& [key, wire] : wires_) known.insert(key.first);  // also where it was lost while it was looked for
-  for (const auto& [number, pipe] : pipes_) known.insert(pipe.path);
-  for (const auto& path : known) {
-    find_object(path, [weak = weak_from_this(), path](const rr::Result<rr::Value>& found) {
-      const auto self = weak.lock();
-      if (!self || self->is_lost()) return;
-      if (!found) return self->handle_released(path);
-      std::vector<MemberKey> wires;
-      for (const auto& [key, wire] : self->wires_)
-        if (key.first == path) wires.push_back(key);
-      for (const auto& key : wires) self->attach_wire(key);
-      std::vector<PipeNumber> pipes;
-      for (const auto& [number, pipe] : self->pipes_)
-        if (pipe.path == path) pipes.push_back(number);
-      for (const auto number : pipes) self->attach_pipe(number);
-      self->for_each_client([&](UpstreamClient& client) { client.found_again(path); });
+  // Also where it was lost while they were looked for.
+  for (const auto& [key, wire] : wires_) known.try_emplace(key.first);
+  for (const auto& [number, pipe] : pipes_) known.try_emplace(pipe.path);
+  for (const auto& each : known)
+    find_object(each.first, [weak = weak_from_this(), each](const rr::Result<rr::Value>& found) {
+      if (const auto self = weak.lock()) self->handle_looked_up(each.first, each.second, found);
     });
-  }
 }
 
-void Upstream::handle_released(const std::string& path) {
-  std::erase_if(objects_, [&](const auto& each) { return rr::is_within(each, path); });
+void Upstream::handle_looked_up(const std::string& path, const std::string& known_type,
+                                const rr::Result<rr::Value>& found) {
+  if (is_lost()) return;
+  // What one login does not get others may have still, by sessions of theirs.
+  if (!found && (use_ != UpstreamUse::all_clients || is_refusal(found.error()))) return drop_objects(path);
+  if (!found || (!known_type.empty() && found->to_text().value() != known_type)) return handle_released(path);
+  std::vector<MemberKey> wires;
+  for (const auto& [key, wire] : wires_)
+    if (key.first == path) wires.push_back(key);
+  for (const auto& key : wires) attach_wire(key);
+  std::vector<PipeNumber> pipes;
+  for (const auto& [number, pipe] : pipes_)
+    if (pipe.path == path) pipes.push_back(number);
+  for (const auto number : pipes) attach_pipe(number);
+  for_each_client([&](UpstreamClient& client) { client.found_again(path); });
+}
+
+void Upstream::drop_objects(const std::string& path) {
+  std::erase_if(objects_, [&](const auto& each) { return rr::is_within(each.first, path); });
   std::vector<MemberKey> wires;
   for (const auto& [key, wire] : wires_)
     if (rr::is_within(key.first, path)) wires.push_back(key);
@@ -241,9 +259,16 @@ void Upstream::handle_released(const std::string& path) {
     if (rr::is_within(pipe.path, path)) pipes.push_back(number);
   for (const auto number : pipes) drop_pipe(number);
   std::erase_if(generators_, [&](const auto& each) { return rr::is_within(each.second.path, path); });
+  for_each_client([&](UpstreamClient& client) { client.release_path(path); });
+}
+
+/// There may be other objects now, or none.
+void Upstream::handle_released(const std::string& path) {
+  const auto self = shared_from_this();
   locks_->handle_released(path);
   if (on_released_) on_released_(path);
-  for_each_client([&](UpstreamClient& client) { client.release_path(path); });
+  drop_objects(path);
+  locks_->check_safe_values(path, self);
 }
 
 // --- requests ---
@@ -268,7 +293,15 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {
       const auto self = weak.lock();
-      if (!self || !found || life.expired()) return done(found);
+      if (!found) return done(found);
+      if (!self || life.expired()) return done(session_has_ended());
+      const auto& known_type = called.object->type_name();
+      if (const auto type = std::string(found->to_text().value()); type != known_type) {
+        self->handle_released(path_of(called));
+        return done(rr::make_error(rr::ErrorCode::object_not_found,
+                                   "object " + rr::quote(path_of(called)) + " is of type " + rr::quote(type) +
+                                       " now, and no longer of " + rr::quote(known_type) + ": look it up again"));
+      }
       self->request(client, called, done);
     });
   }
@@ -296,7 +329,8 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
     return find_object(request.path,
                        [weak = weak_from_this(), request, done = std::move(done)](const rr::Result<rr::Value>& found) {
                          const auto self = weak.lock();
-                         if (!self || !found) return done(found);
+                         if (!found) return done(found);
+                         if (!self) return done(session_has_ended());
                          self->make_safe(request, done);
                        });
   const auto count_answer = [this](Completion answered) {

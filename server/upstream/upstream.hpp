@@ -7,7 +7,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +21,9 @@ namespace rrgate {
 
 /// For requests whose answer nobody waits for.
 inline constexpr auto ignore_result = [](const rr::Result<rr::Value>&) {};
+
+/// Whether a session with another login may get what was refused.
+bool is_refusal(const rr::Error& error);
 
 /// An object of the device. What its members do is asked of the device.
 class SharedObject final : public rr::ServiceObject {
@@ -164,6 +166,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// The client goes on as another user: what it has locked is given back.
   void change_user(UpstreamClient& client);
 
+  /// Another session of this service has found an object: this one hears what becomes of it, too.
+  void note_object(const std::string& path, const std::string& type);
   /// Completes with the object's type. Errors   those of the device; invalid_argument: an index of a plain objref.
   void find_object(const std::string& path, Completion done);
   /// Asks the device; the object of the call is a SharedObject that find_object() has found here.
@@ -311,6 +315,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void look_up(const std::string& path, Completion done);
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
+  /// `known_type`  what it was before; empty: that is not known.
+  void handle_looked_up(const std::string& path, const std::string& known_type, const rr::Result<rr::Value>& found);
+  /// What this session knows of the objects at and below a path ends; its clients are told.
+  void drop_objects(const std::string& path);
   void handle_released(const std::string& path);
   void share_read(const UpstreamClient& client, const std::string& path, const std::string& property, Completion done);
   void begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
@@ -369,9 +377,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   boost::asio::steady_timer attempted_;  ///< cancelled when an attempt is over
   std::shared_ptr<rr::TypeRegistry> types_;
   std::function<void(const std::string&)> on_released_;
-  std::vector<UpstreamClient*> clients_;  ///< in the order in which they came
-  std::uint64_t clients_left_ = 0;        ///< how many ever have: while none does, nobody has to be looked up
-  std::set<std::string> objects_;         ///< paths that were found
+  std::vector<UpstreamClient*> clients_;        ///< in the order in which they came
+  std::uint64_t clients_left_ = 0;              ///< how many ever have: while none does, nobody has to be looked up
+  std::map<std::string, std::string> objects_;  ///< paths that were found -> what they are of
   std::map<MemberKey, std::shared_ptr<Wire>> wires_;
   std::map<PipeNumber, Pipe> pipes_;
   std::map<MemberKey, PipeNumber> shared_pipes_;

@@ -79,6 +79,13 @@ class UpstreamBench {
                                                             const std::string& path, const std::string& member,
                                                             rr::GeneratorId generator = 0,
                                                             std::vector<rr::Value> arguments = {}) {
+    return ask_by(*upstream, client, kind, path, member, generator, std::move(arguments));
+  }
+  /// The same by another session, which may have to look for the object first.
+  std::shared_ptr<std::optional<rr::Result<rr::Value>>> ask_by(Upstream& by, UpstreamClient& client, rr::CallKind kind,
+                                                               const std::string& path, const std::string& member,
+                                                               rr::GeneratorId generator = 0,
+                                                               std::vector<rr::Value> arguments = {}) {
     const auto& type = *upstream->object_type(path);
     rr::Called called;
     called.kind = kind;
@@ -87,7 +94,7 @@ class UpstreamBench {
     called.generator = generator;
     called.arguments = std::move(arguments);
     auto out = std::make_shared<std::optional<rr::Result<rr::Value>>>();
-    upstream->request(client, called, [out](rr::Result<rr::Value> result) { *out = std::move(result); });
+    by.request(client, called, [out](rr::Result<rr::Value> result) { *out = std::move(result); });
     return out;
   }
 

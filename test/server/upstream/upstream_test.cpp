@@ -19,6 +19,9 @@ stdver 0.10
 object Part
     wire double level [readonly]
 end
+object Motor
+    function void stop()
+end
 object Bench
     event struck(int32 number)
     wire double level [readonly]
@@ -32,6 +35,7 @@ object Bench
     objref Bench spare
     objref Bench{int32} others
     objref Part{int32} parts
+    objref varobject{int32} things
 end
 )";
 
@@ -42,6 +46,7 @@ struct Counting {
   std::vector<std::string> commands;       ///< calls of stop(), and values of "wish"
   std::int32_t number = 1;
   int reads = 0;  ///< of the number
+  std::shared_ptr<rr::Object> thing;
 
   Counting() {
     service->generator(
@@ -49,6 +54,7 @@ struct Counting {
     service->root().objref("spare", std::shared_ptr<rr::Object>());
     service->root().objref("others", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
+    service->root().objref("things", [this](std::string_view) { return thing; });
     service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
     service->function("take", [](const std::vector<std::uint8_t>&) {});
     service->property("number")
@@ -59,6 +65,10 @@ struct Counting {
         .set([this](std::int32_t value) { number = value; });
     service->function("stop", [this] { commands.emplace_back("stop"); });
     service->on_wire("wish", [this](double value) { commands.push_back(std::to_string(value)); });
+  }
+  void put_thing(const std::string& type) {
+    thing = service->make_object(type);
+    if (type == "Motor") thing->function("stop", [this] { commands.emplace_back("stop"); });
   }
   /// Generators that clients have opened and not closed.
   long open_generators() const { return life.use_count() - 1; }
@@ -103,17 +113,23 @@ LeaseConfig leases_with_stop() {
   return leases;
 }
 
-/// Has a lease of the whole service, by `upstream`.
-void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
-                std::chrono::milliseconds deadman = 10s) {
-  std::optional<bool> is_held;
+/// About a lease of the whole service, by `upstream`.
+rr::ErrorCode ask_for_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
+                            rr::LockCommand command, std::chrono::milliseconds deadman = 10s) {
+  std::optional<rr::ErrorCode> answer;
   rr::LockWanted wanted;
-  wanted.command = rr::LockCommand::acquire_lease;
+  wanted.command = command;
   wanted.path = "bench";
   wanted.timeout = deadman;
-  upstream->lock(holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
-  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
-  REQUIRE(*is_held);
+  upstream->lock(holder, wanted,
+                 [&](const rr::Result<>& result) { answer = result ? rr::ErrorCode::none : result.error().code; });
+  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+  return *answer;
+}
+
+void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
+                std::chrono::milliseconds deadman = 10s) {
+  REQUIRE(ask_for_lease(bench, upstream, holder, rr::LockCommand::acquire_lease, deadman) == rr::ErrorCode::none);
 }
 
 /// What the gateway asks in sessions that are opened from now on is answered within this time, or it has failed.
@@ -348,6 +364,145 @@ TEST_CASE("a generator whose value comes too late is the client's still, to be e
     hanging.answer();  // until then it is not closed
     CHECK(bench.run_until([&] { return hanging.closed == 1; }));
   }
+}
+
+TEST_CASE("an object that is of another type after an outage is released, and found as what it is") {
+  const std::string path = "bench.things[1]";
+  Counting device;
+  device.put_thing("Part");
+  UpstreamBench bench(device.service);
+  bench.open();
+  REQUIRE(bench.find(path).has_value());
+  std::vector<std::string> released;
+  bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
+  HearingClient client(bench.upstream);
+  bench.upstream->join_wire(client, path, *bench.upstream->object_type(path)->find_member("level"));
+  REQUIRE(bench.run_until([&] { return client.heard.size() == 1; }));
+  cut(bench, bench.upstream);
+  bench.open();
+  REQUIRE(bench.run_until([&] { return client.heard.size() == 2; }));
+  CHECK(client.heard.back() == "wire level joined");
+  CHECK(released.empty());
+  cut(bench, bench.upstream);
+  device.put_thing("Motor");
+  device.service->root().release("things", "1");
+  bench.open();
+  REQUIRE(bench.run_until([&] { return client.heard.size() == 3; }));
+  CHECK(client.heard.back() == "released " + path);
+  CHECK(released == std::vector{path});
+  CHECK(bench.find(path)->to_text().value() == "test.bench.Motor");
+}
+
+TEST_CASE("a session hears that an object is of another type now though another session has found it") {
+  const std::string path = "bench.things[1]";
+  Counting device;
+  device.put_thing("Motor");
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::vector<std::string> released;
+  bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
+  bench.upstream->note_object(path, "test.bench.Part");
+  cut(bench, bench.upstream);
+  bench.open();
+  REQUIRE(bench.run_until([&] { return !released.empty(); }));
+  CHECK(released == std::vector{path});
+}
+
+TEST_CASE("a request to an object that is of another type than its client was told is not passed on") {
+  const std::string path = "bench.things[1]";
+  Counting device;
+  device.put_thing("Motor");
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::vector<std::string> released;
+  bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
+  HearingClient client(bench.upstream);
+  rr::Called called;
+  called.kind = rr::CallKind::peek_in;
+  called.object = std::make_shared<SharedObject>(path, "test.bench.Part");
+  called.member = bench.upstream->types()->find_entity("test.bench.Part")->find_member("level");
+  std::optional<rr::Result<rr::Value>> answer;
+  bench.upstream->request(client, called, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
+  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+  REQUIRE_FALSE(answer->has_value());
+  CHECK(answer->error().code == rr::ErrorCode::object_not_found);
+  CHECK(client.heard == std::vector{"released " + path});
+  CHECK(released == std::vector{path});
+}
+
+TEST_CASE("what one login is refused after an outage stays with all others") {
+  Counting device;
+  device.put_thing("Part");
+  UpstreamBench bench(device.service);
+  bench.open();
+  REQUIRE(bench.find("bench.things[1]").has_value());
+  std::vector<std::string> released;
+  bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
+  HearingClient client(bench.upstream);
+  cut(bench, bench.upstream);
+  device.service->root().objref("things", [](std::string_view) -> std::shared_ptr<rr::Object> {
+    throw rr::ServiceException("not for you", rr::ErrorCode::permission_denied);
+  });
+  device.service->root().release("things", "1");
+  bench.open();
+  REQUIRE(bench.run_until([&] { return !client.heard.empty(); }));
+  CHECK(client.heard == std::vector<std::string>{"released bench.things[1]"});
+  CHECK(released.empty());
+}
+
+TEST_CASE("a request whose client leaves while its object is looked for has failed") {
+  const std::string path = "bench.things[1]";
+  Counting device;
+  device.put_thing("Motor");
+  UpstreamBench bench(device.service);
+  bench.open();
+  REQUIRE(bench.find(path).has_value());
+  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  std::optional<HearingClient> client(std::in_place, own);
+  const auto asked = bench.ask_by(*own, *client, rr::CallKind::function, path, "stop");
+  client.reset();
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  REQUIRE_FALSE((**asked).has_value());
+  CHECK((*asked)->error().code == rr::ErrorCode::connection_error);
+  CHECK(device.commands.empty());
+  own->close();
+}
+
+TEST_CASE("what makes safe is held against the object that the device has now") {
+  Counting device;
+  device.put_thing("Motor");
+  LeaseConfig leases;
+  leases.is_offered = true;
+  leases.safe = {{SafeAction::Kind::call, "bench.things[1]", "stop", "[]"}};
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  HearingClient client(bench.upstream);
+  const auto ask = [&](rr::LockCommand command) { return ask_for_lease(bench, bench.upstream, client, command); };
+  // Those that follow come behind the answer of the device to the question what it has now.
+  const auto acquire = [&] {
+    bench.find("bench.others[1]");
+    return ask(rr::LockCommand::acquire_lease);
+  };
+  const auto replace = [&] {
+    const auto before = client.heard.size();
+    device.service->root().release("things", "1");
+    REQUIRE(bench.run_until([&] { return client.heard.size() > before; }));
+  };
+  CHECK(acquire() == rr::ErrorCode::none);
+  CHECK(ask(rr::LockCommand::release_lease) == rr::ErrorCode::none);
+  device.put_thing("Part");
+  replace();
+  CHECK(acquire() == rr::ErrorCode::invalid_configuration);
+  device.put_thing("Motor");
+  replace();
+  CHECK(acquire() == rr::ErrorCode::none);
+  CHECK(ask(rr::LockCommand::release_lease) == rr::ErrorCode::none);
+  device.thing.reset();
+  replace();
+  CHECK(acquire() == rr::ErrorCode::invalid_configuration);
+  device.put_thing("Motor");  // of which nobody is told
+  CHECK(bench.run_until([&] { return acquire() == rr::ErrorCode::none; }));
 }
 
 TEST_CASE("what a device was asked when its service ended is told to be lost with the connection") {
