@@ -169,6 +169,8 @@ describe("drafts", () => {
     expect(edited(Float32Array.of(1.5), "[2.5, 3]")).toEqual(Float32Array.of(2.5, 3));
     expect(edited(BigUint64Array.of(1n), "18446744073709551615")).toEqual(BigUint64Array.of(2n ** 64n - 1n));
     expect(() => edited(Uint8Array.of(1), "256")).toThrow("element 0: 256 is out of range; expected uint8, 0 to 255");
+    expect(edited(Int32Array.of(2), "2.5")).toEqual(Float64Array.of(2.5));
+    expect(edited(Int32Array.of(2), "")).toBeNull();
     expect(edited("on", "12")).toBe("12");
     expect(edited("on", "")).toBe("");
     expect(edited(null, "12")).toBe(12);

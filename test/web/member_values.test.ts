@@ -62,6 +62,23 @@ test("the value of a member is not shown as that of another one without connecti
   expect(text()).not.toContain("12.5");
 });
 
+test("the value of a member that equals that of the one before is shown", async () => {
+  const wire = async function* (): AsyncGenerator<unknown, void> {
+    yield false;
+    await new Promise(() => undefined);
+  };
+  const members = [memberOf("wire", "bool", "a"), memberOf("wire", "bool", "b")];
+  const update = show(TablePanel, propsOf({ wire }, members));
+  await settle();
+  await look();
+  expect(text()).toContain("false");
+  await update(ofB);
+  await settle();
+  await look();
+  await look();
+  expect(text()).toContain("false");
+});
+
 test("a picture that is taken of one camera is not shown as that of another one", async () => {
   let taken = (_: unknown): void => undefined;
   const call = () => new Promise((resolve) => (taken = resolve));

@@ -52,5 +52,6 @@ test("pods and named arrays are numpy's, with room for the most that there may b
     'value1[1]["x"] = 2',
     "value1",
   ]);
+  expect(written(Int16Array.of(2), "varvalue")).toEqual(['RR.VarValue([2], "int16[]")']);
   expect(written([true, NaN, 2n, null], "varvalue")).toEqual(['[True, float("nan"), 2, None]']);
 });

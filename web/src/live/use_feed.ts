@@ -39,6 +39,7 @@ export function useFeed(object: Remote | null, kind: FeedKind | null, member: st
       if (!feed || feed.member !== member) return;
       const next = lookAt(feed, object !== null, performance.now());
       setLook((old) =>
+        old.feed === next.feed &&
         old.value === next.value &&
         old.failure === next.failure &&
         old.stale === next.stale &&

@@ -2,6 +2,7 @@
 // Layer: web/panels, pure. Source: the documentation of RobotRaconteur's Python module.
 
 import type { Definitions, Struct } from "../values/definitions";
+import { itemsOf } from "../values/draft";
 import { parseType } from "../values/type_text";
 
 export class PythonCode {
@@ -84,8 +85,9 @@ export class PythonCode {
 /** What says its type with it. */
 function varvalue(value: unknown): string {
   const types: Readonly<Record<string, string>> = { string: "string", number: "double", boolean: "bool" };
-  const type =
-    Array.isArray(value) && value.every((each) => typeof each === "number") ? "double[]" : types[typeof value];
+  const isNumbers = Array.isArray(value) && value.every((each) => typeof each === "number");
+  const items = itemsOf(value) ?? (isNumbers ? "double" : undefined);
+  const type = items === undefined ? types[typeof value] : `${items}[]`;
   return type === undefined ? plain(value) : `RR.VarValue(${plain(value)}, "${type}")`;
 }
 

@@ -234,9 +234,11 @@ const ITEM_TYPES: Readonly<Record<string, string>> = {
 /** It stays of the type that the device had, where that can be told; else it is JSON, or a text. */
 function varvalueOf(text: string, was: unknown): unknown {
   if (typeof was === "string") return text;
-  const items = itemsOf(was);
-  if (items !== undefined) return parseInput(text, `${items}[]`);
   if (text.trim() === "") return null;
+  const items = itemsOf(was);
+  // A whole number that is read may have been any: nothing says that it has to be whole.
+  const isFraction = items?.includes("int") === true && /\d\.\d|\de/i.test(text);
+  if (items !== undefined) return parseInput(text, isFraction ? "double[]" : `${items}[]`);
   const named = typeOf(was);
   if (named !== undefined) return rrValue(named, parseInput(text, named));
   if (was instanceof Map)
@@ -250,7 +252,8 @@ function varvalueOf(text: string, was: unknown): unknown {
   }
 }
 
-function itemsOf(value: unknown): string | undefined {
+/** The type of the items of a TypedArray. */
+export function itemsOf(value: unknown): string | undefined {
   return ArrayBuffer.isView(value) ? ITEM_TYPES[value.constructor.name] : undefined;
 }
 
