@@ -71,7 +71,7 @@ void BlockingConnection::run_for(std::chrono::milliseconds duration) {
     const Serving serving(is_serving_);
     if (io_.poll_one() == 0) break;
   }
-  run_handlers();
+  run_handlers(std::chrono::steady_clock::now());
 }
 
 bool BlockingConnection::serve(std::optional<std::chrono::steady_clock::time_point> until) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include "core/support/node_id.hpp"
 #include "node/platform/utc_time.hpp"
@@ -228,6 +229,10 @@ std::string recorded_ring(const std::string& path) {
 }
 
 bool has_recorded_messages(const std::string& path) {
+  // What stands before the first message is much smaller: nothing of large files needs to be read.
+  constexpr std::uintmax_t surely = 1u << 20;
+  std::error_code error;
+  if (const auto size = std::filesystem::file_size(path, error); error || size > surely) return true;
   auto reader = McapReader::open(path);
   if (!reader) return true;
   for (;;) {

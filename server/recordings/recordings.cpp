@@ -151,6 +151,7 @@ rr::awaitable<void> Recordings::look_after(Recordings* self, std::weak_ptr<int> 
       const auto limits = self->config_.recordings;
       const auto work = [&missing, &under_way, &limits] {
         std::vector<Paths> rings;
+        rings.reserve(missing.size());
         for (const auto& wish : missing) rings.push_back(find_ring(limits.folder, wish, limits.standing, under_way));
         return rings;
       };

@@ -149,12 +149,11 @@ void FoundDevices::drop_device(Node& node) {
 }
 
 std::string FoundDevices::free_name(const rr::NodeDiscoveryInfo& node) const {
-  const auto id = id_text(node.node_id);
+  auto id = id_text(node.node_id);
   const auto& name = node.node_name.empty() ? "node" : node.node_name;
   // The same node gets the same name again, whoever else is there, but for two that claim one name at a time.
   for (const auto& ending : {node.node_name.empty() ? "-" + id.substr(0, 8) : std::string(), "-" + id.substr(0, 8)})
-    if (const auto wanted = name.substr(0, max_name_size - ending.size()) + ending; !devices_.find(wanted))
-      return wanted;
+    if (auto wanted = name.substr(0, max_name_size - ending.size()) + ending; !devices_.find(wanted)) return wanted;
   return id;
 }
 
@@ -187,7 +186,7 @@ void FoundDevices::begin_question(const rr::NodeId& id, std::vector<rr::Connecti
   const auto question = questions_.emplace(questions_.end());
   auto asked = ask(id, std::move(urls));
   asio::co_spawn(io_, std::move(asked),
-                 asio::bind_cancellation_slot(question->slot(), [this, question](std::exception_ptr) {
+                 asio::bind_cancellation_slot(question->slot(), [this, question](const std::exception_ptr&) {
                    questions_.erase(question);
                    wake_.cancel();
                  }));

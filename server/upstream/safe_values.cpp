@@ -100,6 +100,7 @@ void SafeValues::read(Item& item, Upstream& upstream) {
 void SafeValues::take(Item& item, rr::Result<SafeRequest> request) {
   const bool is_known = !request && !item.request && request.error().message == item.request.error().message;
   item.request = std::move(request);
+  if (item.request) item.last = *item.request;
   if (!item.request && !is_known)
     log(LogLevel::error, "no leases where this would have to be safe",
         {{"device", device_}, {"error", item.request.error().message}});
@@ -136,8 +137,8 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
   }
   by->forget_commands(path);
   for (const auto& item : items_) {
-    if (!rr::is_within(item.action.path, path) || !item.request) continue;
-    by->make_safe(*item.request,
+    if (!rr::is_within(item.action.path, path) || !item.last) continue;
+    by->make_safe(*item.last,
                   [weak = weak_from_this(), path, by, action = item.action](const rr::Result<rr::Value>& result) {
                     const auto self = weak.lock();
                     if (result || !self) return;

@@ -50,6 +50,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   struct Item {
     SafeAction action;
     rr::Result<SafeRequest> request;
+    std::optional<SafeRequest> last = {};  ///< that was good: for leases of before the object was released
   };
 
   void look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream);

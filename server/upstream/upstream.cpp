@@ -295,8 +295,9 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
       const auto self = weak.lock();
       if (!found) return done(found);
       if (!self || life.expired()) return done(session_has_ended());
-      const auto& known_type = called.object->type_name();
-      if (const auto type = std::string(found->to_text().value()); type != known_type) {
+      const auto& known_type = called.object->type_name();  // empty: whatever it is
+      const auto type = std::string(found->to_text().value());
+      if (!known_type.empty() && type != known_type) {
         self->handle_released(path_of(called));
         return done(rr::make_error(rr::ErrorCode::object_not_found,
                                    "object " + rr::quote(path_of(called)) + " is of type " + rr::quote(type) +

@@ -364,6 +364,7 @@ def test_a_disk_that_is_full_and_has_room_again(device, node, tmp_path, is_close
             assert stream.status == 503
             assert re.search(r'rrgate_rejected_total\{reason="audit"\} [1-9]', metrics)
             assert ask(site.port, "POST", BASE + "?lease=acquire", headers=bearer(site.token)).status == 503
+            assert ask(site.port, "PUT", BASE + "/p_double?lease=renew", 1.5, bearer(site.token)).status == 503
             with pytest.raises(RR.RobotRaconteurException, match="can't write its audit log"):
                 arm.p_double = 2.5
         # What stops something, keeps a lease or gives it back, is done in any case.

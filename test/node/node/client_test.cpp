@@ -306,6 +306,24 @@ TEST_CASE("a client that waits for no time takes what has come") {
   CHECK(heard == 2);
 }
 
+TEST_CASE("a wait whose time is over calls one more handler at most") {
+  std::shared_ptr<Service> service;
+  RunningNode node([&](Node& made) { service = add_echo(made); });
+  const auto echo = connect(node.url("Echo"));
+  int heard = 0;
+  echo.on_event("said", [&](std::span<const Value>) {
+    std::this_thread::sleep_for(5ms);
+    ++heard;
+  });
+  node.ask([&](Node&) {
+    for (int i = 0; i < 200; ++i) service->fire("said", "x");
+    return 0;
+  });
+  std::this_thread::sleep_for(50ms);
+  for (int i = 0; i < 10; ++i) echo.connection().run_for(0ms);
+  CHECK(heard <= 50);  // of 200
+}
+
 TEST_CASE("a session that ends with its beginning is known as closed") {
   RunningNode node([](Node& made) { add_echo(made)->on_client_connected([&made](ClientId) { made.stop(); }); });
   const auto echo = connect(node.url("Echo"));

@@ -505,6 +505,48 @@ TEST_CASE("what makes safe is held against the object that the device has now") 
   CHECK(bench.run_until([&] { return acquire() == rr::ErrorCode::none; }));
 }
 
+TEST_CASE("a lease of before its object was released makes safe what the device has there now") {
+  Counting device;
+  device.put_thing("Motor");
+  LeaseConfig leases;
+  leases.is_offered = true;
+  leases.safe = {{SafeAction::Kind::call, "bench.things[1]", "stop", "[]"}};
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  HearingClient client(bench.upstream);
+  CHECK(bench.run_until([&] {
+    return ask_for_lease(bench, bench.upstream, client, rr::LockCommand::acquire_lease) == rr::ErrorCode::none;
+  }));
+  const auto before = client.heard.size();
+  device.thing.reset();
+  device.service->root().release("things", "1");
+  REQUIRE(bench.run_until([&] { return client.heard.size() > before; }));
+  bench.find("bench.others[1]");  // behind the answer of the device that it is not there
+  device.put_thing("Motor");
+  REQUIRE(ask_for_lease(bench, bench.upstream, client, rr::LockCommand::release_lease) == rr::ErrorCode::none);
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+}
+
+TEST_CASE("who asks for a member whatever its object is releases nothing") {
+  const std::string path = "bench.things[1]";
+  Counting device;
+  device.put_thing("Part");
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::vector<std::string> released;
+  bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
+  HearingClient client(bench.upstream);
+  rr::Called called;
+  called.kind = rr::CallKind::peek_in;
+  called.object = std::make_shared<SharedObject>(path, std::string());
+  called.member = bench.upstream->types()->find_entity("test.bench.Part")->find_member("level");
+  std::optional<rr::Result<rr::Value>> answer;
+  bench.upstream->request(client, called, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
+  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+  CHECK(released.empty());
+  CHECK(client.heard.empty());
+}
+
 TEST_CASE("what a device was asked when its service ended is told to be lost with the connection") {
   Counting device;
   UpstreamBench bench(device.service);
