@@ -60,7 +60,11 @@ BlockingConnection::BlockingConnection(std::string_view url, ConnectOptions opti
 
 BlockingConnection::~BlockingConnection() {
   is_handling_ = true;  // no handler is called any more: what it refers to may be gone already
-  close();
+  try {
+    close();
+  } catch (...) {
+    // Out of memory: there is no goodbye then, and nobody here who could do better.
+  }
 }
 
 void BlockingConnection::run_for(std::chrono::milliseconds duration) {
