@@ -194,9 +194,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   friend class Service;
   friend class ServiceClient;
 
-  /// What the service has for one member.
   using OnEndpoint = std::function<void(PipeEndpoint)>;
-  /// Handlers are shared with the call that runs them: they may set others in their own place.
+  /// What the service has for one member. Handlers are shared with the call that runs them: they may set others in
+  /// their own place.
   struct Member {
     std::shared_ptr<const Handler> call = {};                ///< functions
     std::shared_ptr<const GeneratorHandler> generator = {};  ///< generator functions

@@ -215,12 +215,12 @@ awaitable<Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uin
     endpoints = endpoints_of(literal, port);
     co_return endpoints;
   }
-  const auto executor = co_await asio::this_coro::executor;
-  auto lookup = std::make_shared<Lookup>(executor);
   if (host == "localhost") {  // no question for a name server
     endpoints = {{asio::ip::address_v4::loopback(), port}, {asio::ip::address_v6::loopback(), port}};
     co_return endpoints;
   }
+  const auto executor = co_await asio::this_coro::executor;
+  auto lookup = std::make_shared<Lookup>(executor);
   // What nobody waits for any more makes no others wait: all look-ups of a process go one after another.
   struct Guard {
     Lookup& lookup;

@@ -125,9 +125,9 @@ class Access {
 
   explicit Access(const AccessConfig& config, const rr::Bytes& key);
   void take(AccessStatePtr next);
-  /// What has come into the users file, and what has gone from it; the same of the tokens file.
   /// What becomes of users and tokens with `next`.
   void record_changes(const AccessState& next);
+  /// What has come into the users file, and what has gone from it; the same of the tokens file.
   void record_users(const AccessState& before, const AccessState& now);
   void record_tokens(const AccessState& before, const AccessState& now);
 

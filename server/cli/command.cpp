@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/config/version.hpp"
+#include "server/json/json.hpp"
 
 namespace rrgate {
 
@@ -65,8 +66,7 @@ int Commands::run(std::vector<std::string> words) {
 }
 
 void print_json_line(const nlohmann::ordered_json& json) {
-  // Names of files may be no UTF-8.
-  std::cout << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
+  std::cout << rr::write_json(json) << std::endl;  // also names of files that are no UTF-8
 }
 
 int report_failure(std::string_view command, std::string_view what) {

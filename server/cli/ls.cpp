@@ -167,7 +167,7 @@ void print_json(const FoundService& service, std::string_view mark) {
   line["implements"] = service.implements;
   line["url"] = service.url;
   if (!service.problem.empty()) line["problem"] = service.problem;
-  std::cout << line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+  std::cout << rr::write_json(line) << "\n";
 }
 
 void print_table(const std::vector<FoundService>& services, std::string_view mark) {

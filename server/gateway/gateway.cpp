@@ -235,18 +235,13 @@ rr::Result<> Gateway::reconfigure(Config next) {
       if (has(config_.listen, address)) continue;
       auto listener = open(address, bound);
       if (!listener) {
-        const auto is_in_the_way = [&](const Listener& other) {
-          return other.address.port == address.port && !has(next.listen, other.address);
-        };
-        for (auto it = listeners_.begin(); it != listeners_.end();) {
-          if (!is_in_the_way(*it)) {
-            ++it;
-            continue;
-          }
-          yielded.push_back(it->address);
-          it->socket->close();
-          it = listeners_.erase(it);
-        }
+        std::erase_if(listeners_, [&](const Listener& other) {
+          const bool is_in_the_way = other.address.port == address.port && !has(next.listen, other.address);
+          if (!is_in_the_way) return false;
+          other.socket->close();
+          yielded.push_back(other.address);
+          return true;
+        });
         if (!yielded.empty()) listener = open(address, bound);
       }
       if (!listener) return fail(listener.error());

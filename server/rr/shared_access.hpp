@@ -20,7 +20,7 @@ class SessionRights {
   /// For ServiceSessionOptions::admit, but for requests of locks and leases, which may be to give something back: see
   /// admit_lock(). Errors   permission_denied; authentication_error: a login may help.
   /// `is_vital`  see AccessRequest.
-  [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted, bool is_vital = false);
+  [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted, bool is_vital);
   /// What is to be recorded of something that was admitted; see Access::begin().
   AuditEntryPtr begin(const rr::MemberAccess& admitted);
   /// Of what was admitted, but asked for too often.

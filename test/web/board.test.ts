@@ -1,4 +1,5 @@
 // The board without a browser: where panels stand, what a file may hold, drafts, definitions, paces.
+import { memberOf } from "./members";
 import { packBoard, parseBoard, recallBoard, sameBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
 import type { Board } from "../../web/src/board/board";
 import { Keeper } from "../../web/src/board/keeper";
@@ -543,14 +544,7 @@ describe("a board", () => {
   });
 
   test("starts from the type where it is known, else from the members", () => {
-    const member = (name: string, kind: Member["kind"], type: string): Member => ({
-      name,
-      kind,
-      type,
-      parameters: [],
-      modifiers: [],
-      documentation: "",
-    });
+    const member = (name: string, kind: Member["kind"], type: string): Member => memberOf(kind, type, name);
     const members = [
       member("pose", "wire", "Pose"),
       member("halt", "function", "void"),

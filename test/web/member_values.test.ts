@@ -1,4 +1,5 @@
 // Panels of one member among several: nothing of one is shown under the name of another.
+import { memberOf } from "./members";
 import { button, clear, find, press, settle, show, text } from "./shown";
 import ImagePanel from "../../web/src/panels/image_panel";
 import MemoryPanel from "../../web/src/panels/memory_panel";
@@ -11,15 +12,6 @@ beforeEach(() => void vi.useFakeTimers({ toFake: ["setInterval", "clearInterval"
 afterEach(() => {
   clear();
   vi.useRealTimers();
-});
-
-const memberOf = (kind: Member["kind"], type: string, name: string): Member => ({
-  name,
-  kind,
-  type,
-  parameters: [],
-  modifiers: [],
-  documentation: "",
 });
 
 const propsOf = (object: object, members: readonly Member[]): PanelProps =>

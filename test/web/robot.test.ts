@@ -104,6 +104,12 @@ describe("driver", () => {
   const makeDriver = (onError: (error: unknown) => void = () => undefined) =>
     new Driver<DriveCommand>({ rest: STOP, same: sameCommand, onError });
 
+  /** It is there, and comes back whenever it is asked for. */
+  const rightToMove = () => {
+    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    return right;
+  };
+
   function connection(): { calls: Call[]; send: (command: DriveCommand) => Promise<void> } {
     const calls: Call[] = [];
     const settle = async (action: () => void): Promise<void> => {
@@ -135,7 +141,7 @@ describe("driver", () => {
   it("asks for the right to move again where a stop that has just been answered took it away", async () => {
     const { calls, send } = connection();
     const driver = makeDriver();
-    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    const right = rightToMove();
     driver.setConnection({ send, right });
     driver.want(GO);
     await calls[0]?.answer();
@@ -151,7 +157,7 @@ describe("driver", () => {
   it("stops once the right to move was given back, and moves by a new wish alone", async () => {
     const { calls, send } = connection();
     const driver = makeDriver();
-    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    const right = rightToMove();
     driver.setConnection({ send, right });
     driver.want(GO);
     await calls[0]?.answer();
@@ -168,7 +174,7 @@ describe("driver", () => {
   it("drops a wish that waited for an answer while the right to move was given back", async () => {
     const { calls, send } = connection();
     const driver = makeDriver();
-    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    const right = rightToMove();
     driver.setConnection({ send, right });
     driver.want(GO);
     driver.want(TURN);

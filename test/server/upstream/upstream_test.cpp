@@ -152,6 +152,19 @@ struct Attempts {
   }
 };
 
+/// Asks for the wire "level" of an object that the client takes for a `type`; empty: for whatever it is.
+rr::Result<rr::Value> peek_level(UpstreamBench& bench, HearingClient& client, const std::string& path,
+                                 const std::string& type) {
+  rr::Called called;
+  called.kind = rr::CallKind::peek_in;
+  called.object = std::make_shared<SharedObject>(path, type);
+  called.member = bench.upstream->types()->find_entity("test.bench.Part")->find_member("level");
+  std::optional<rr::Result<rr::Value>> answer;
+  bench.upstream->request(client, called, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
+  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+  return *answer;
+}
+
 }  // namespace
 
 TEST_CASE("a client that leaves while an event is handed out hears nothing of it; all others do") {
@@ -417,15 +430,9 @@ TEST_CASE("a request to an object that is of another type than its client was to
   std::vector<std::string> released;
   bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
   HearingClient client(bench.upstream);
-  rr::Called called;
-  called.kind = rr::CallKind::peek_in;
-  called.object = std::make_shared<SharedObject>(path, "test.bench.Part");
-  called.member = bench.upstream->types()->find_entity("test.bench.Part")->find_member("level");
-  std::optional<rr::Result<rr::Value>> answer;
-  bench.upstream->request(client, called, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
-  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
-  REQUIRE_FALSE(answer->has_value());
-  CHECK(answer->error().code == rr::ErrorCode::object_not_found);
+  const auto answer = peek_level(bench, client, path, "test.bench.Part");
+  REQUIRE_FALSE(answer.has_value());
+  CHECK(answer.error().code == rr::ErrorCode::object_not_found);
   CHECK(client.heard == std::vector{"released " + path});
   CHECK(released == std::vector{path});
 }
@@ -536,13 +543,7 @@ TEST_CASE("who asks for a member whatever its object is releases nothing") {
   std::vector<std::string> released;
   bench.upstream->on_released([&](const std::string& which) { released.push_back(which); });
   HearingClient client(bench.upstream);
-  rr::Called called;
-  called.kind = rr::CallKind::peek_in;
-  called.object = std::make_shared<SharedObject>(path, std::string());
-  called.member = bench.upstream->types()->find_entity("test.bench.Part")->find_member("level");
-  std::optional<rr::Result<rr::Value>> answer;
-  bench.upstream->request(client, called, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
-  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+  peek_level(bench, client, path, "");
   CHECK(released.empty());
   CHECK(client.heard.empty());
 }

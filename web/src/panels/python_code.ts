@@ -2,7 +2,7 @@
 // Layer: web/panels, pure. Source: the documentation of RobotRaconteur's Python module.
 
 import type { Definitions, Struct } from "../values/definitions";
-import { itemsOf } from "../values/draft";
+import { itemsOf } from "../values/parse";
 import { parseType } from "../values/type_text";
 
 export class PythonCode {

@@ -5,7 +5,7 @@ import { rrValue, typeOf } from "rrgate-client";
 
 import type { Definitions } from "./definitions";
 import { enumName } from "./definitions";
-import { parseInput } from "./parse";
+import { itemsOf, parseInput } from "./parse";
 import { isComplex, isNumeric, parseType } from "./type_text";
 import type { TypeText } from "./type_text";
 
@@ -218,19 +218,6 @@ export function formatUuid(bytes: unknown): string {
   return digits.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
-const ITEM_TYPES: Readonly<Record<string, string>> = {
-  Float64Array: "double",
-  Float32Array: "single",
-  Int8Array: "int8",
-  Uint8Array: "uint8",
-  Int16Array: "int16",
-  Uint16Array: "uint16",
-  Int32Array: "int32",
-  Uint32Array: "uint32",
-  BigInt64Array: "int64",
-  BigUint64Array: "uint64",
-};
-
 /** It stays of the type that the device had, where that can be told; else it is JSON, or a text. */
 function varvalueOf(text: string, was: unknown): unknown {
   if (typeof was === "string") return text;
@@ -250,11 +237,6 @@ function varvalueOf(text: string, was: unknown): unknown {
   } catch {
     return text;
   }
-}
-
-/** The type of the items of a TypedArray. */
-export function itemsOf(value: unknown): string | undefined {
-  return ArrayBuffer.isView(value) ? ITEM_TYPES[value.constructor.name] : undefined;
 }
 
 function at<T>(where: string, make: () => T): T {

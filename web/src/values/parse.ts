@@ -140,6 +140,13 @@ const ARRAY_OF: Readonly<Record<string, new (length: number) => ArrayLike<number
   bool: Uint8Array,
 };
 
+/** The type of the items of a TypedArray. */
+export function itemsOf(value: unknown): string | undefined {
+  if (value instanceof BigInt64Array) return "int64";
+  if (value instanceof BigUint64Array) return "uint64";
+  return Object.entries(ARRAY_OF).find(([, made]) => value instanceof made)?.[0];
+}
+
 function typedArray(items: readonly unknown[], type: TypeText): unknown {
   checkLength(items.length, type);
   if (isComplex(type.base)) {
