@@ -96,7 +96,7 @@ Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool ta
   return fail(error);
 }
 
-void TcpListener::start(OnAccept on_accept, OnProblem on_problem) {
+void TcpListener::start(const OnAccept& on_accept, const OnProblem& on_problem) {
   for (const auto& acceptor : acceptors_)
     asio::co_spawn(executor_, accept_all(acceptor, on_accept, on_problem), asio::detached);
 }

@@ -31,7 +31,7 @@ class TcpListener {
   /// descriptors left, say); it goes on a little later then.
   using OnAccept = std::function<void(boost::asio::ip::tcp::socket)>;
   using OnProblem = std::function<void(const std::string& problem)>;
-  void start(OnAccept on_accept, OnProblem on_problem);
+  void start(const OnAccept& on_accept, const OnProblem& on_problem);
   void close();
 
  private:
