@@ -199,18 +199,22 @@ test("the page speaks German to a German browser, and English again where that i
   await context.close();
 });
 
-test("can be installed, and says plainly that it is offline", async ({ page, lab, context }) => {
-  await page.goto(lab.url);
-  const manifest = await page.request.get(`${lab.url}manifest.webmanifest`);
-  expect(manifest.headers()["content-type"]).toContain("application/manifest+json");
-  expect(await manifest.json()).toMatchObject({ display: "standalone", start_url: "./" });
-  await page.evaluate(async () => void (await navigator.serviceWorker.ready));
-  await context.setOffline(true);
-  await page.reload();
-  await expect(page.getByRole("heading", { name: "The gateway cannot be reached" })).toBeVisible();
-  await context.setOffline(false);
-  await page.getByRole("link", { name: /Try again/ }).click();
-  await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
+test.describe("with its service worker", () => {
+  test.use({ serviceWorkers: "allow" });
+
+  test("can be installed, and says plainly that it is offline", async ({ page, lab, context }) => {
+    await page.goto(lab.url);
+    const manifest = await page.request.get(`${lab.url}manifest.webmanifest`);
+    expect(manifest.headers()["content-type"]).toContain("application/manifest+json");
+    expect(await manifest.json()).toMatchObject({ display: "standalone", start_url: "./" });
+    await page.evaluate(async () => void (await navigator.serviceWorker.ready));
+    await context.setOffline(true);
+    await page.reload();
+    await expect(page.getByRole("heading", { name: "The gateway cannot be reached" })).toBeVisible();
+    await context.setOffline(false);
+    await page.getByRole("link", { name: /Try again/ }).click();
+    await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
+  });
 });
 
 test("a wall screen is used to its edge; what is arranged there is found again, and finds room on a desk", async ({

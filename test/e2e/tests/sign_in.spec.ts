@@ -118,51 +118,57 @@ test("who asks for access is given a token by somebody who may, and is in with i
   await other.context().close();
 });
 
-test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({
-  page,
-  context,
-}) => {
-  await context.grantPermissions(["notifications"]);
-  const answers: (string | null)[] = [];
-  let approvals = [
-    {
-      id: "a1",
-      user: "bot",
-      client: "10.0.0.5",
-      device: "create",
-      path: "Create",
-      member: "Drive",
-      verb: "call",
-      values: { velocity: 100 },
-      why: "to see the door",
-      ["expires_in"]: 20,
-    },
-  ];
-  await page.route("**/api/v1/agents/approvals", (route) => route.fulfill({ json: { approvals, ["stopped_for"]: 0 } }));
-  await page.route("**/api/v1/agents/approvals/a1", async (route) => {
-    answers.push(route.request().postData());
-    approvals = [];
-    await route.fulfill({ json: { state: "allowed" } });
-  });
-  await page.goto(lab.url);
-  await signIn(page, "root", password);
-  const approval = page.locator('[data-approval="a1"]');
-  for (const words of ["bot", "create · Create.Drive", '{"velocity":100}', "to see the door"])
-    await expect(approval).toContainText(words);
-  await page.evaluate(() => Object.defineProperty(document, "hidden", { get: () => true }));
-  const notices = (): Promise<string[]> =>
-    page.evaluate(async () => {
-      const worker = await navigator.serviceWorker.ready;
-      return (await worker.getNotifications()).map(({ title, body }) => `${title} ${body}`);
+test.describe("with its service worker", () => {
+  test.use({ serviceWorkers: "allow" });
+
+  test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({
+    page,
+    context,
+  }) => {
+    await context.grantPermissions(["notifications"]);
+    const answers: (string | null)[] = [];
+    let approvals = [
+      {
+        id: "a1",
+        user: "bot",
+        client: "10.0.0.5",
+        device: "create",
+        path: "Create",
+        member: "Drive",
+        verb: "call",
+        values: { velocity: 100 },
+        why: "to see the door",
+        ["expires_in"]: 20,
+      },
+    ];
+    await page.route("**/api/v1/agents/approvals", (route) =>
+      route.fulfill({ json: { approvals, ["stopped_for"]: 0 } }),
+    );
+    await page.route("**/api/v1/agents/approvals/a1", async (route) => {
+      answers.push(route.request().postData());
+      approvals = [];
+      await route.fulfill({ json: { state: "allowed" } });
     });
-  await expect.poll(notices).toEqual(["The agent of bot asks to do this: create · Create.Drive"]);
-  await expect(async () => {
-    await approval.getByRole("button", { name: "Allow once" }).click(); // not before it has been seen
-    await expect(approval).toBeHidden({ timeout: 200 });
-  }).toPass();
-  await expect.poll(notices).toEqual([]);
-  expect(answers).toEqual(['{"answer":"once"}']);
-  await expect(page.getByRole("button", { name: "Stop all agents" })).toBeVisible();
+    await page.goto(lab.url);
+    await signIn(page, "root", password);
+    const approval = page.locator('[data-approval="a1"]');
+    for (const words of ["bot", "create · Create.Drive", '{"velocity":100}', "to see the door"])
+      await expect(approval).toContainText(words);
+    await page.evaluate(() => Object.defineProperty(document, "hidden", { get: () => true }));
+    const notices = (): Promise<string[]> =>
+      page.evaluate(async () => {
+        const worker = await navigator.serviceWorker.ready;
+        return (await worker.getNotifications()).map(({ title, body }) => `${title} ${body}`);
+      });
+    await expect.poll(notices).toEqual(["The agent of bot asks to do this: create · Create.Drive"]);
+    await expect(async () => {
+      await approval.getByRole("button", { name: "Allow once" }).click(); // not before it has been seen
+      await expect(approval).toBeHidden({ timeout: 200 });
+    }).toPass();
+    await expect.poll(notices).toEqual([]);
+    expect(answers).toEqual(['{"answer":"once"}']);
+    await expect(page.getByRole("button", { name: "Stop all agents" })).toBeVisible();
+  });
 });
 
 test("what agents ask for moves nothing, covers no Stop, and is not allowed by a press that was meant for something else", async ({
