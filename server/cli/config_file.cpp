@@ -8,6 +8,7 @@
 #include "server/cli/run_gateway.hpp"
 #include "server/cli/service_manager.hpp"
 #include "server/config/access_options.hpp"
+#include "server/config/cautions.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -41,6 +42,8 @@ void complete_config(Config& config) {
   configure_log(config.log.level, config.log.format);
   if (const auto problem = exposure(config.listen, config); !problem.empty())
     log(LogLevel::warning, "insecure", {{"why", problem}});
+  for (const auto& [path, text] : find_cautions(config))
+    log(LogLevel::warning, "caution", {{"at", path}, {"why", text}});
   fit_descriptors(config.limits);
   if (config.web_root.empty()) config.web_root = find_web_root();
 }

@@ -11,6 +11,7 @@
 #include "server/front/refused_client.hpp"
 #include "server/front/serve_shared_client.hpp"
 #include "server/http/endpoints/objects.hpp"
+#include "server/http/other_pages.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/log/log.hpp"
 #include "server/mcp/mcp_endpoint.hpp"
@@ -361,6 +362,7 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   HttpAccess::Admitted admitted;
   const auto passes = who_passes(gateway, request);
   admitted.refusal = refuse_page(gateway, request);
+  const bool is_foreign = admitted.refusal.has_value();
   if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
   if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
     admitted = co_await gateway.http_access().admit(request, connection, config, passes);
@@ -380,7 +382,7 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
     const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
     co_return co_await accept_websocket(gateway, connection, std::move(stream), request, unread);
   }
-  std::vector<std::pair<std::string, std::string>> headers;
+  auto headers = is_foreign ? std::vector<std::pair<std::string, std::string>>() : headers_for_page(request);
   if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
     headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
   if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));

@@ -12,6 +12,7 @@
 #include "server/http/endpoints/metrics.hpp"
 #include "server/http/endpoints/objects.hpp"
 #include "server/http/endpoints/recordings.hpp"
+#include "server/http/other_pages.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/mcp/mcp_endpoint.hpp"
 
@@ -55,7 +56,8 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {get, "/api/v1/devices/*", objects_endpoint(gateway)},
       {put, "/api/v1/devices/*", objects_endpoint(gateway)},
       {post, "/api/v1/devices/*", objects_endpoint(gateway)},
-      {options, "/api/v1/devices/*", objects_endpoint(gateway)},
+      {options, "/api/v1/devices", preflight_endpoint()},
+      {options, "/api/v1/devices/*", preflight_endpoint()},
       {get, "/api/v1/discovery", discovery_endpoint(gateway)},
       {get, "/api/v1/recordings", recordings_endpoint(gateway)},
       {post, "/api/v1/recordings", with_body(begin_recording_endpoint(gateway))},
@@ -67,6 +69,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/session", sign_in_endpoint(gateway)},
       {delete_, "/api/v1/session", sign_out_endpoint(gateway)},
       {post, "/api/v1/tickets", tickets_endpoint(gateway)},
+      {options, "/api/v1/tickets", preflight_endpoint()},
       {post, "/api/v1/access/requests", with_body(ask_endpoint(gateway))},
       {get, "/api/v1/access/requests", requests_endpoint(gateway)},
       {post, "/api/v1/access/requests/*", with_body(request_endpoint(gateway))},

@@ -336,6 +336,12 @@ def test_who_lets_everybody_in_must_say_so(tmp_path):
         assert "without TLS" in gateway.wait_for("insecure")["why"]
     finally:
         gateway.process.stop()
+    gateway = Gateway(tmp_path, {"listen": ["127.0.0.1:0"], "devices": [], "trusted_proxies": ["127.0.0.1"]})
+    try:
+        caution = gateway.wait_for("caution")
+        assert caution["at"] == "/access/rules" and "everybody whom a proxy lets through may do everything" in caution["why"]
+    finally:
+        gateway.process.stop()
 
 
 def test_passwd_and_token(tmp_path):

@@ -361,6 +361,15 @@ def test_pages_of_other_origins_use_what_is_allowed_to_them(device, tmp_path):
         assert stream.response.headers["Access-Control-Allow-Origin"] == page["Origin"]
         stream.close()
 
+        for method, path in (("GET", "/api/v1/devices"), ("POST", "/api/v1/tickets")):
+            answer = ask(port, method, path, headers=page, base="")
+            assert answer.status in (200, 201) and answer.headers["Access-Control-Allow-Origin"] == page["Origin"]
+            leave = ask(port, "OPTIONS", path, headers={**page, **asks}, base="")
+            assert leave.status == 204 and "Authorization" in leave.headers["Access-Control-Allow-Headers"]
+        for path in ("/api/v1/access", "/api/v1/recordings", "/metrics", "/api/v1/devicesx"):  # not theirs
+            answer = ask(port, "GET", path, headers=page, base="")
+            assert not [name for name in answer.headers if name.lower().startswith("access-control-")], path
+
         for method, body in (("GET", None), ("PUT", 7.5), ("OPTIONS", None)):
             refused = ask(port, method, "/p_double", body, {**stranger, **(asks if method == "OPTIONS" else {})})
             assert refused.status == 403 and "allowed_origins" in refused.json["detail"], method

@@ -329,31 +329,13 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   co_await writer.send(response);
 }
 
-/// Pages that may not read have been refused before (foreign_page.hpp).
-void share_with_page(ResponseWriter& writer) {
-  const auto origin = writer.request().header(http::field::origin);
-  if (origin.empty()) return;
-  writer.add_header("Access-Control-Allow-Origin", std::string(origin));
-  writer.add_header("Vary", "Origin");
-}
-
 rr::awaitable<void> answer(GatewayState& gateway, ResponseWriter& writer, std::string rest) {
-  Response response;
-  const auto& request = writer.request();
   auto segments = split_path(rest);
-  share_with_page(writer);
-  if (request.message.method() == http::verb::options) {
-    response.status = 204;
-    response.set("Access-Control-Allow-Methods", "GET, HEAD, PUT, POST");
-    response.set("Access-Control-Allow-Headers",
-                 "Accept, Authorization, Content-Type, Last-Event-ID, Range, Rrgate-Lease, traceparent");
-    response.set("Access-Control-Max-Age", "600");
-  } else if (!segments || segments->empty()) {
-    response = problem_response(404, segments ? "expected /api/v1/devices/NAME" : segments.error().message);
-  } else {
+  if (segments && !segments->empty()) {
     co_await serve(gateway, writer, std::move(*segments));
     co_return;
   }
+  const auto response = problem_response(404, segments ? "expected /api/v1/devices/NAME" : segments.error().message);
   co_await writer.send(response);
 }
 

@@ -1,13 +1,18 @@
 // Signing in at the dashboard of a gateway that asks who one is.
 import { expect, test } from "@playwright/test";
 import type { Locator, Page } from "@playwright/test";
+import { existsSync, readFileSync } from "node:fs";
+import { createServer } from "node:http";
+import path from "node:path";
 import { GuardedLab, password } from "../guarded_lab";
-import { webRoot } from "../processes";
+import { freePort, repositoryRoot, webRoot } from "../processes";
 
 let lab: GuardedLab;
+let otherPage: string;
 
 test.beforeAll(async () => {
-  lab = await GuardedLab.start(webRoot);
+  otherPage = `http://127.0.0.1:${await freePort()}`;
+  lab = await GuardedLab.start(webRoot, { more: { ["allowed_origins"]: [otherPage] } });
 });
 
 test.afterAll(() => lab?.stop());
@@ -94,6 +99,45 @@ test("a device is connected with tickets, again after a restart of the gateway; 
   await expect(page.locator('[data-link="online"]')).toBeVisible();
   await signOut(page).click();
   await expect(form(page)).toBeVisible();
+});
+
+test("a page of another origin that is allowed lists the devices, and connects to one with a token", async ({
+  page,
+}) => {
+  const site = createServer(({ url = "/" }, answer) => {
+    if (url === "/") return void answer.setHeader("Content-Type", "text/html").end("<!doctype html>");
+    const file = path.join(repositoryRoot, "wasm-client/dist", url);
+    if (!existsSync(file)) return void answer.writeHead(404).end(); // the browser looks for an icon
+    const type = url.endsWith(".js") ? "text/javascript" : "application/wasm";
+    answer.setHeader("Content-Type", type).end(readFileSync(file));
+  });
+  await new Promise<void>((resolve) => site.listen(Number(new URL(otherPage).port), "127.0.0.1", resolve));
+  await page.goto(otherPage);
+  interface Robot {
+    readonly DistanceTraveled: { get(): Promise<number> };
+    readonly $: { close(): Promise<void> };
+  }
+  interface Client {
+    connect(url: string, options: { token: string }): Promise<Robot>;
+  }
+  const use = async ({ gateway, token, module }: { gateway: string; token: string; module: string }) => {
+    const { connect } = (await import(module)) as Client;
+    const list = await fetch(`${gateway}api/v1/devices`, { headers: { ["Authorization"]: `Bearer ${token}` } });
+    const { devices } = (await list.json()) as { devices: { name: string }[] };
+    const url = `${gateway.replace("http", "ws")}devices/create?service=Create`;
+    const robot = await connect(url, { token });
+    const travelled = await robot.DistanceTraveled.get();
+    await robot.$.close();
+    const refused = await connect(url, { token: "wrong" }).catch((error: Error) => error.name);
+    return { devices: devices.map((device) => device.name), travelled, refused };
+  };
+  const given = { gateway: lab.url, token: lab.token, module: `${otherPage}/index.js` };
+  expect(await page.evaluate(use, given)).toEqual({
+    devices: ["create"],
+    travelled: 0,
+    refused: "RobotRaconteur.AuthenticationError",
+  });
+  site.close();
 });
 
 test("who asks for access is given a token by somebody who may, and is in with it", async ({ page, browser }) => {
