@@ -211,13 +211,14 @@ void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
   if (child && !may_stand_behind(*service_.types_, child->type_name(), member))
     refuse(where + ": is " + format_type(member.type) + ", the object is " + child->type_name());
   members_[&member].find = [child = std::move(child)](std::string_view) { return child; };
-  for (const std::string& path : paths()) release_path(child_path(path, member.name));
+  release(member, std::nullopt);
 }
 
 void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>()> find) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
   if (member.is_indexed()) refuse(type_name() + "." + member.name + " is indexed: it takes a function of the index");
   members_[&member].find = [find = std::move(find)](std::string_view) { return find(); };
+  release(member, std::nullopt);
 }
 
 void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find) {
@@ -226,14 +227,24 @@ void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>
   members_[&member].find = std::move(find);
 }
 
+void Object::release(std::string_view name) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  if (member.is_indexed()) refuse(type_name() + "." + member.name + " is indexed: release() takes an index");
+  release(member, std::nullopt);
+}
+
 void Object::release(std::string_view name, std::string_view index) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
-  for (const std::string& path : paths()) release_path(child_path(path, member.name, index));
+  if (!member.is_indexed()) refuse(type_name() + "." + member.name + " has no index");
+  release(member, index);
+}
+
+void Object::release(const MemberDefinition& objref, std::optional<std::string_view> index) {
+  for (const std::string& path : paths()) release_path(child_path(path, objref.name, index));
 }
 
 std::vector<std::string> Object::paths() const {
   if (!service_.hosted_) return {};
-  if (this == service_.root_.get()) return {service_.name_};
   return service_.hosted_->paths_of(*this);
 }
 
@@ -278,6 +289,9 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
     if (service_.host_) service_.host_->report(describe_failure("objref", objref.name, error));
     return make_error(ErrorCode::object_not_found, std::move(error.message));
   }
+  if (child && &child->service_ != &service_)
+    return make_error(ErrorCode::internal_error, "objref '" + objref.name + "': the object is of another service, '" +
+                                                     child->service_.name_ + "'");
   if (child && !may_stand_behind(*service_.types_, child->type_name(), objref))
     return make_error(ErrorCode::internal_error, "objref '" + objref.name + "' is " + format_type(objref.type) +
                                                      ", the service gave a " + child->type_name());

@@ -175,7 +175,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   /// objref without index. Set again, clients are told to look it up anew.
   void objref(std::string_view name, std::shared_ptr<Object> child);
-  /// objref without index: find() is asked when a client looks it up first; nullptr where there is no object.
+  /// objref without index: find() is asked when a client looks it up first; nullptr where there is no object. Set
+  /// again, clients are told to look it up anew.
   void objref(std::string_view name, std::function<std::shared_ptr<Object>()> find);
   /// Indexed objref: find(index text) returns the object, or nullptr where there is none.
   void objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find);
@@ -183,7 +184,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void allow_monitor() { has_monitor_ = true; }
   bool is_monitor_lockable() const override { return has_monitor_; }
 
-  /// The object behind an indexed objref was replaced: clients are told to look it up anew.
+  /// The object behind an objref that a function finds was replaced: clients are told to look it up anew.
+  void release(std::string_view objref);
+  /// The same of an indexed objref.
   void release(std::string_view objref, std::string_view index);
 
   const std::string& type_name() const override { return type_->qualified_name; }
@@ -226,6 +229,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const;
   detail::MemoryForm memory_form(std::string_view name, DataType items) const;
   std::vector<std::string> paths() const;
+  void release(const MemberDefinition& objref, std::optional<std::string_view> index);
   void release_path(const std::string& path);
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
   std::vector<std::string> missing_handlers() const;

@@ -137,7 +137,8 @@ void MemberFollower::handle_failed(PlaceId id, const Error& error) {
   if (found == places_.end()) return;
   found->second.is_connected = false;
   const auto keep = shared_from_this();
-  if (const auto handler = failed) handler(found->second.root, error);
+  if (const auto handler = failed)
+    core_->call_handler("failed of " + member_, [&, root = found->second.root] { handler(root, error); });
   found = places_.find(id);
   if (found == places_.end()) return;
   auto& timer = found->second.retry;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <iostream>
 
 #include "node/driver/backoff.hpp"
 
@@ -209,7 +210,7 @@ void SubscriptionCore::handle_connected(const AsyncObject& root, const ServiceSu
   const auto keep = shared_from_this();
   clients_.push_back({id, root});
   for (const auto& follower : std::vector(followers_)) follower->attach(root);
-  if (const auto handler = connected) handler(root);
+  if (const auto handler = connected) call_handler("connected", [&] { handler(root); });
   if (!is_closed_) waiters_.complete_all(root);
 }
 
@@ -217,12 +218,24 @@ void SubscriptionCore::handle_lost(const AsyncObject& root, const Error& reason)
   const auto keep = shared_from_this();
   std::erase_if(clients_, [&](const Client& client) { return client.root.connection() == root.connection(); });
   for (const auto& follower : std::vector(followers_)) follower->detach(root);
-  if (const auto handler = lost) handler(root, reason);
+  if (const auto handler = lost) call_handler("lost", [&] { handler(root, reason); });
 }
 
 void SubscriptionCore::handle_failed(const Error& error, const std::string& url) {
   const auto keep = shared_from_this();
-  if (const auto handler = failed) handler(error, url);
+  if (const auto handler = failed) call_handler("failed", [&] { handler(error, url); });
+}
+
+void SubscriptionCore::call_handler(std::string_view kind, const std::function<void()>& call) const {
+  try {
+    call();
+  } catch (...) {
+    const auto problem = describe_failure("subscription", kind, handler_error(std::current_exception()));
+    if (const auto& report = options_.connect.report)
+      report(problem);
+    else
+      std::cerr << problem << '\n';
+  }
 }
 
 void SubscriptionCore::close() {

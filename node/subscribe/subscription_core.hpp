@@ -85,6 +85,8 @@ class SubscriptionCore : public std::enable_shared_from_this<SubscriptionCore> {
   /// Attaches it to the clients that are there. Not for a closed subscription.
   void follow(std::shared_ptr<SubscriptionFollower> follower);
   void unfollow(const SubscriptionFollower* follower);
+  /// Calls a handler of the user. What it throws is reported, and the subscription goes on.
+  void call_handler(std::string_view kind, const std::function<void()>& call) const;
 
   boost::asio::io_context& io_context() { return io_; }
   const SubscriptionOptions& options() const { return options_; }

@@ -213,7 +213,7 @@ Error TlsStream::handshake_error(const error_code& error) const {
 
 awaitable<ReadResult> TlsStream::read_some(std::span<std::uint8_t> into) {
   if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
-  for (;;) {
+  for (const auto cancels = cancels_; cancels == cancels_;) {
     ERR_clear_error();
     const auto room = static_cast<int>(std::min<std::size_t>(into.size(), 1 << 30));
     const int result = SSL_read(ssl_.get(), into.data(), room);
@@ -233,6 +233,12 @@ awaitable<ReadResult> TlsStream::read_some(std::span<std::uint8_t> into) {
     }
     if (const auto lost = co_await feed(); lost) co_return ReadResult{lost, 0};
   }
+  co_return ReadResult{asio::error::operation_aborted, 0};
+}
+
+void TlsStream::cancel() {
+  ++cancels_;
+  inner_->cancel();
 }
 
 awaitable<error_code> TlsStream::write(std::span<const ByteSpan> slices) {

@@ -40,7 +40,7 @@ class TlsStream final : public ByteStream {
   awaitable<error_code> write(std::span<const ByteSpan> slices) override;
   /// Does nothing: end() follows.
   void finish_sending() override {}
-  void cancel() override { inner_->cancel(); }
+  void cancel() override;
   awaitable<void> end(const EndReason& reason) override;
   void close() override { inner_->close(); }
   std::string peer() const override { return inner_->peer(); }
@@ -74,9 +74,10 @@ class TlsStream final : public ByteStream {
   PeerCheck check_;
   std::unique_ptr<ssl_st, Free> ssl_;
   Deadline limit_;
-  Bytes received_;  ///< reused: what the peer sent last
-  Bytes staged_;    ///< reused: small slices on their way into one record
-  Bytes sending_;   ///< what is being written
+  Bytes received_;           ///< reused: what the peer sent last
+  Bytes staged_;             ///< reused: small slices on their way into one record
+  Bytes sending_;            ///< what is being written
+  std::size_t cancels_ = 0;  ///< a read of several steps looks at it between them
   bool is_open_ = false;
   bool is_writing_ = false;
   error_code broken_;                  ///< a write ended in the middle of a record: nothing more can be sent

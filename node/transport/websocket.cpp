@@ -28,7 +28,7 @@ WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRol
 
 awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
   if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
-  for (;;) {
+  for (const auto cancels = cancels_; cancels == cancels_;) {
     if (decoder_.received_close()) co_return ReadResult{};
     const auto read = co_await inner_->read_some(into);
     if (read.error || read.is_end()) co_return read;
@@ -45,6 +45,12 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
     }
     if (payload > 0) co_return ReadResult{{}, payload};
   }
+  co_return ReadResult{asio::error::operation_aborted, 0};
+}
+
+void WebSocketStream::cancel() {
+  ++cancels_;
+  inner_->cancel();
 }
 
 std::size_t WebSocketStream::try_write(std::span<const ByteSpan> slices, error_code& error) {

@@ -23,7 +23,7 @@ class WebSocketStream final : public ByteStream {
   awaitable<error_code> write(std::span<const ByteSpan> slices) override;
   /// WebSockets have no half-closed state: does nothing, end() follows.
   void finish_sending() override {}
-  void cancel() override { inner_->cancel(); }
+  void cancel() override;
   awaitable<void> end(const EndReason& reason) override;
   void close() override;
   std::string peer() const override { return inner_->peer(); }
@@ -41,6 +41,7 @@ class WebSocketStream final : public ByteStream {
   FrameSplitter splitter_;
   Deadline close_limit_;
   bool takes_close_;
+  std::size_t cancels_ = 0;             ///< a read of several steps looks at it between them
   std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
   bool is_writing_ = false;
   std::size_t controls_ = 0;  ///< control frames that wait, or are written: they come before the next frame of data

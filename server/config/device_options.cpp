@@ -137,6 +137,10 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
                "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
   read_way(in, device);
   in.object("tls", [&](ObjectReader& part) { part.files("ca", device.tls.ca); });
+  const auto& scheme = device.url.scheme;
+  if (!device.tls.ca.empty() && !scheme.empty() && !scheme.starts_with("rrs+") && !scheme.ends_with("+wss"))
+    in.finding("tls", "has a CA, but there is no TLS in " + rr::quote(scheme + "://") +
+                          "; expected rrs+tcp or another with TLS");
 }
 
 void read_discover(ObjectReader& in, Discover& discover) {

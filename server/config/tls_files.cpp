@@ -6,8 +6,14 @@
 
 namespace rrgate {
 
+TlsFiles TlsFiles::of_https(DeviceTls device) {
+  TlsFiles out(std::move(device));
+  out.is_of_https_ = true;
+  return out;
+}
+
 rr::TlsTrust TlsFiles::trust() const {
-  if (device_.ca.empty()) return rr::default_trust();
+  if (device_.ca.empty()) return is_of_https_ ? rr::TlsTrust() : rr::default_trust();
   rr::TlsTrust trust;
   trust.files = device_.ca;
   return trust;
@@ -31,12 +37,18 @@ TlsFiles::Looks TlsFiles::look() const {
 
 rr::Result<> TlsFiles::load() {
   seen_ = look();  // before reading: what changes meanwhile is seen at the next look
-  rr::NodeTlsOptions device;
-  device.trust = trust();
-  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_, clients_);
+  auto made = make();
   if (!made) return made.error();
   context_ = std::move(*made);
   return {};
+}
+
+rr::Result<rr::TlsContextPtr> TlsFiles::make() const {
+  if (!certificates_.empty()) return rr::make_web_tls(certificates_, clients_);
+  if (is_of_https_) return rr::make_web_client_tls(trust());
+  rr::NodeTlsOptions device;
+  device.trust = trust();
+  return rr::make_node_tls(device);
 }
 
 bool TlsFiles::reload() {

@@ -20,6 +20,8 @@ class TlsFiles {
       : certificates_(std::move(certificates)), clients_(std::move(clients)) {}
   /// For connections to a device. Without CAs: default_trust().
   explicit TlsFiles(DeviceTls device) : device_(std::move(device)) {}
+  /// For HTTPS to a device. Without CAs: those that the system trusts.
+  static TlsFiles of_https(DeviceTls device);
 
   /// Errors   those of make_web_tls() and make_node_tls(); then context() stays as it was.
   [[nodiscard]] rr::Result<> load();
@@ -34,11 +36,13 @@ class TlsFiles {
   /// Of each file what tells that it was changed or replaced.
   using Looks = std::map<std::string, std::string>;
   rr::TlsTrust trust() const;
+  rr::Result<rr::TlsContextPtr> make() const;
   Looks look() const;
 
   std::vector<rr::WebCertificate> certificates_;
   rr::ClientTrust clients_;
   DeviceTls device_;
+  bool is_of_https_ = false;  ///< and of a client's role
   Looks seen_;
   rr::TlsContextPtr context_;
 };

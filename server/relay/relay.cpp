@@ -77,7 +77,16 @@ rr::awaitable<void> Relay::pump_to_device() {
   to_device_done_.cancel();
 }
 
+/// Whatever one direction ends by, the other must hear of it: both use what run() holds.
 rr::awaitable<void> Relay::pump(Direction& direction) {
+  try {
+    co_await pump_all(direction);
+  } catch (const std::bad_alloc&) {
+    stop({1011, "the gateway has no memory left"});
+  }
+}
+
+rr::awaitable<void> Relay::pump_all(Direction& direction) {
   rr::ReadBuffer buffer(options_.outbox_bytes);
   std::size_t held = 0;  // bytes of an incomplete message start, at the front; far fewer than there is room for
   while (!end_reason_) {
@@ -87,6 +96,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       end_of(direction, read.error);
       break;
     }
+    if (end_reason_) break;
     held += read.bytes;
     buffer.note_read(held);
     const auto messages = direction.gate.messages();

@@ -54,6 +54,7 @@ class Relay {
 
   rr::awaitable<void> pump_to_device();
   rr::awaitable<void> pump(Direction& direction);
+  rr::awaitable<void> pump_all(Direction& direction);
   rr::awaitable<void> keep_pace(Direction& direction, std::size_t bytes);
   void end_of(Direction& direction, rr::error_code error);
   rr::EndReason broken_rule(const Direction& direction, const rr::Error& error) const;

@@ -58,6 +58,16 @@ bool is_secure(const rr::ConnectionUrl& url) {
   return scheme && scheme->is_secure;
 }
 
+bool is_https(const rr::ConnectionUrl& url) {
+  return url.scheme.ends_with("+wss");
+}
+
+/// Of TLS between nodes, where there is that, and HTTPS, the former has the CAs of the configuration.
+std::shared_ptr<TlsFiles> https_files(const DeviceConfig& config) {
+  if (!is_https(config.url)) return nullptr;
+  return std::make_shared<TlsFiles>(TlsFiles::of_https(is_secure(config.url) ? DeviceTls() : config.tls));
+}
+
 }  // namespace
 
 std::string_view to_string(DeviceState state) {
@@ -79,6 +89,7 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
       tls_(tls                      ? std::move(tls)
            : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
                                     : nullptr),
+      https_(https_files(config_)),
       retry_(whole.retry),
       request_timeout_(whole.timeouts.request),
       backoff_(retry_.min, retry_.max),
@@ -92,18 +103,24 @@ rr::DialOptions Device::dial_options(std::string_view way) const {
   const auto own = rr::format_node_id(look_id_, rr::NodeIdFormat::dashes);
   options.headers.emplace_back(way_header, way.empty() ? own : std::string(way) + ", " + own);
   if (tls_) options.tls = tls_->context();
+  if (https_) options.web_tls = https_->context();
   return options;
 }
 
 rr::Result<> Device::load_tls() {
-  if (!tls_) return {};
-  auto loaded = tls_->load();
-  if (!loaded) loaded.error().message = "device " + rr::quote(config_.name) + ": " + loaded.error().message;
-  return loaded;
+  for (const auto& files : {tls_, https_}) {
+    if (!files) continue;
+    auto loaded = files->load();
+    if (loaded) continue;
+    loaded.error().message = "device " + rr::quote(config_.name) + ": " + loaded.error().message;
+    return loaded;
+  }
+  return {};
 }
 
 void Device::reload_tls(bool is_forced) {
-  if (tls_ && (is_forced || tls_->has_changed()) && tls_->reload()) look_again();
+  for (const auto& files : {tls_, https_})
+    if (files && (is_forced || files->has_changed()) && files->reload()) look_again();
 }
 
 template <class T>
@@ -426,6 +443,7 @@ Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_n
     return choices == 1 ? devices_.front().get() : nullptr;
   }
   for (const auto& device : devices_) {
+    if (device->is_shared()) continue;  // a node of the gateway's own stands for it
     const auto identity = identity_of(*device);
     if ((node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name))
       return device.get();

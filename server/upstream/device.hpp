@@ -146,6 +146,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::function<void(const LeaseNews&)> on_lease_;
   rr::DialOptions dial_options_;
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
+  std::shared_ptr<TlsFiles> https_;                      ///< the same of HTTPS, which is around that
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
   std::chrono::milliseconds request_timeout_;

@@ -122,12 +122,13 @@ def bare_device(tmp_path_factory):
 @pytest.mark.parametrize("near_mode", ["relay", "shared"])
 @pytest.mark.parametrize("far_mode", ["relay", "shared"])
 @pytest.mark.parametrize("scheme", ["rr+ws", "rr+wss"])
-def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch, scheme, far_mode, near_mode):
+def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, scheme, far_mode, near_mode):
     """A token in the headers of the near one's device is the proof, for its looks and for its clients."""
     tls = make_web_certificates(tmp_path / "web")
-    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
     far, token = protected_gateway(tmp_path / "far", bare_device, far_mode, tls=tls)
     device = {"name": "interop", "url": f"{scheme}://localhost:{far.port}/devices/interop?service=interop", "mode": near_mode}
+    if scheme == "rr+wss":
+        device["tls"] = {"ca": [str(tmp_path / "web" / "web-ca.pem")]}
     proof = [{"name": "Authorization", "value": "Bearer " + token}]
     (tmp_path / "near").mkdir()
     near = Gateway(tmp_path / "near", {"devices": [device]})
@@ -152,6 +153,20 @@ def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch,
     finally:
         near.process.stop()
         far.process.stop()
+
+
+def test_a_device_that_is_listed_twice_is_relayed_by_its_node(bare_device, tmp_path):
+    twice = [{"name": "robot", "url": bare_device, "mode": "shared"}, {"name": "own", "url": bare_device}]
+    gateway = Gateway(tmp_path, {"devices": twice})
+    try:
+        for device in twice:
+            gateway.wait_for("device online", device=device["name"])
+        listed = read_json(f"http://127.0.0.1:{gateway.port}/api/v1/devices")["devices"]
+        nodes = {device["name"]: device["node_id"] for device in listed}
+        for node in (f"nodeid={nodes['own']}", "nodename=robot"):
+            assert rrgate("get", f"rr+tcp://127.0.0.1:{gateway.port}/?{node}&service=interop", "version") == "1"
+    finally:
+        gateway.process.stop()
 
 
 def test_the_near_gateway_logs_in_at_the_far_one(lab, bare_device, tmp_path):

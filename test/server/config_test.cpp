@@ -237,6 +237,7 @@ TEST_CASE("what stands between the gateway and a device") {
   CHECK(parsed.config.devices[0].proxy == rr::HostPort{"::1", 3128});
   CHECK(parsed.config.devices[0].headers == rr::HttpHeaders{{"Authorization", "Bearer x"}});
   finds(device("rr+ws://h/?service=s", R"("proxy": "nowhere")"), "gateway.json: /devices/0/proxy: ");
+  finds(device("rr+ws://h/?service=s", R"("tls": {"ca": ["ca.pem"]})"), "gateway.json: /devices/0/tls: ", "no TLS");
   finds(device("rr+local:///?nodename=n&service=s", R"("proxy": "p:1")"),
         "gateway.json: /devices/0/proxy: ", "rr+local");
   finds(device("rr+ws://h/?service=s", R"("headers": [{"name": "Host", "value": "x"}])"),

@@ -75,6 +75,27 @@ struct OpaqueRun {
   milliseconds took{};
 };
 
+/// Has no memory for what it reads.
+class FullStream final : public rr::ByteStream {
+ public:
+  explicit FullStream(std::unique_ptr<rr::ByteStream> inner) : inner_(std::move(inner)) {}
+
+  rr::awaitable<rr::ReadResult> read_some(std::span<std::uint8_t> into) override {
+    static_cast<void>(co_await inner_->read_some(into));
+    throw std::bad_alloc();
+  }
+  rr::awaitable<rr::error_code> write(std::span<const rr::ByteSpan> slices) override { return inner_->write(slices); }
+  void finish_sending() override { inner_->finish_sending(); }
+  void cancel() override { inner_->cancel(); }
+  rr::awaitable<void> end(const rr::EndReason& reason) override { return inner_->end(reason); }
+  void close() override { inner_->close(); }
+  std::string peer() const override { return inner_->peer(); }
+  boost::asio::any_io_executor executor() override { return inner_->executor(); }
+
+ private:
+  std::unique_ptr<rr::ByteStream> inner_;
+};
+
 }  // namespace
 
 TEST_CASE("what is encrypted end to end passes whole, at a bounded rate") {
@@ -117,4 +138,31 @@ TEST_CASE("while one side takes nothing, the relay takes no more from the other 
   device.server->close();
   io.restart();
   io.run();
+}
+
+TEST_CASE("a direction without memory ends the relay, and the other direction with it") {
+  const bool is_client = GENERATE(true, false);
+  boost::asio::io_context io(1);
+  rr::test::MemoryStreams client(io.get_executor());
+  rr::test::MemoryStreams device(io.get_executor());
+  FullStream full(std::move(is_client ? client.server : device.client));
+  rr::ByteStream& client_end = is_client ? static_cast<rr::ByteStream&>(full) : *client.server;
+  rr::ByteStream& device_end = is_client ? *device.client : static_cast<rr::ByteStream&>(full);
+  Traffic traffic;
+  MemoryBudget budget(1'000'000);
+  Relay relay(client_end, device_end, {5'000'000, 65'536, 1'000'000}, traffic, budget.charge("client"));
+  rr::EndReason reason;
+  std::exception_ptr failure;
+  boost::asio::co_spawn(io, relay.run(), [&](std::exception_ptr thrown, rr::EndReason why) {
+    failure = thrown;
+    reason = std::move(why);
+  });
+  const rr::Bytes message(10);
+  const rr::ByteSpan slice(message);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  boost::asio::co_spawn(io, (is_client ? client.client : device.server)->write(slices), boost::asio::detached);
+  io.run();
+  CHECK_FALSE(failure);
+  CHECK(reason.code == 1011);
+  CHECK(reason.text == "the gateway has no memory left");
 }

@@ -225,6 +225,52 @@ TEST_CASE("calls that are under way when a connection is lost fail, and are not 
   });
 }
 
+TEST_CASE("handlers that throw are reported, and the subscription goes on") {
+  LampNode lamp;
+  asio::io_context io;
+  std::vector<std::string> reports;
+  int lost = 0;
+  run(io, [&]() -> asio::awaitable<void> {
+    auto options = quick();
+    options.connect.report = [&](const std::string& problem) { reports.push_back(problem); };
+    std::vector<std::string> urls{"rr+tcp://127.0.0.1:1/?service=Lamp", lamp.url()};
+    auto lamps = subscribe_service(io, urls, options);
+    auto dark = lamps.wire("dark");
+    int failures = 0;
+    lamps.on_connected([](const AsyncObject&) { throw std::runtime_error("of on_connected"); });
+    lamps.on_failed([](const Error&, const std::string&) { throw std::runtime_error("of on_failed"); });
+    lamps.on_lost([&](const AsyncObject&, const Error&) {
+      ++lost;
+      throw std::runtime_error("of on_lost");
+    });
+    dark.on_failed([&](const AsyncObject&, const Error&) {
+      ++failures;
+      throw std::runtime_error("of a member");
+    });
+    for (std::int32_t life = 1; life <= 2; ++life) {
+      const auto client = co_await lamps.client(5s);
+      const auto level = co_await client.get("level");
+      CHECK(number(level) == life);
+      for (const int before = failures; failures < before + 2;) co_await client.get("level");
+      if (life == 2) break;
+      lamp.stop();
+      while (lamps.default_client()) {
+        asio::steady_timer pause(io, 1ms);
+        co_await pause.async_wait(asio::use_awaitable);
+      }
+      lamp.start();
+    }
+  });
+  CHECK(lost == 1);
+  const auto told = [&](const std::string& what) {
+    return std::count(reports.begin(), reports.end(), "subscription '" + what);
+  };
+  CHECK(told("connected': its handler failed: of on_connected") == 2);
+  CHECK(told("failed': its handler failed: of on_failed") >= 2);
+  CHECK(told("lost': its handler failed: of on_lost") == 1);
+  CHECK(told("failed of dark': its handler failed: of a member") >= 4);
+}
+
 TEST_CASE("each attempt tries the URLs in order, and says which failed") {
   LampNode lamp;
   asio::io_context io;

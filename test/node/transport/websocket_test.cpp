@@ -3,6 +3,8 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <catch2/catch.hpp>
 #include <string>
 
@@ -53,6 +55,32 @@ class StingyStream final : public ByteStream {
  private:
   std::unique_ptr<ByteStream> inner_;
   std::size_t& budget_;
+};
+
+/// Has a ping, which it gives as soon as the loop comes round, and then nothing.
+class PingStream final : public ByteStream {
+ public:
+  explicit PingStream(asio::any_io_executor executor) : executor_(std::move(executor)) {}
+
+  awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override {
+    co_await asio::post(executor_, asio::use_awaitable);
+    if (reads++ > 0) co_return ReadResult{asio::error::timed_out, 0};
+    const auto ping = make_control_frame(WebSocketRole::client, WebSocketOpcode::ping, {});
+    std::copy(ping.begin(), ping.end(), into.begin());
+    co_return ReadResult{{}, ping.size()};
+  }
+  awaitable<error_code> write(std::span<const ByteSpan>) override { co_return error_code(); }
+  void finish_sending() override {}
+  void cancel() override {}
+  awaitable<void> end(const EndReason&) override { co_return; }
+  void close() override {}
+  std::string peer() const override { return "ping"; }
+  asio::any_io_executor executor() override { return executor_; }
+
+  int reads = 0;
+
+ private:
+  asio::any_io_executor executor_;
 };
 
 struct Pair {
@@ -208,4 +236,19 @@ TEST_CASE("a pong comes before the next frame of who writes without a pause") {
   CHECK_FALSE(is_over);
   pair.near.close();
   pair.run();
+}
+
+TEST_CASE("a read that is cancelled between two of its steps ends") {
+  asio::io_context io(1);
+  auto inner = std::make_unique<PingStream>(io.get_executor());
+  const auto& pings = *inner;
+  WebSocketStream socket(std::move(inner), WebSocketRole::server, false);
+  Bytes room(100);
+  ReadResult result;
+  asio::co_spawn(io, socket.read_some(room), [&](std::exception_ptr, ReadResult read) { result = read; });
+  REQUIRE(io.run_one() == 1);  // has asked for bytes
+  socket.cancel();
+  io.run();
+  CHECK(result.error == asio::error::operation_aborted);
+  CHECK(pings.reads == 1);
 }
