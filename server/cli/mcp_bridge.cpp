@@ -27,6 +27,7 @@ constexpr int resource_not_found = -32002;
 
 /// Which has requests that are answered with news.
 constexpr const char* listening_revision = "2026-07-28";
+constexpr const char* list_changed = "notifications/resources/list_changed";
 /// After a cut; twice as long each time, until something is told: the gateway records each refusal.
 constexpr std::chrono::seconds first_pause{1};
 constexpr std::chrono::seconds longest_pause{60};
@@ -68,19 +69,26 @@ struct McpBridge::Message {      // NOLINT(bugprone-exception-escape): JSON's nu
   std::function<void(const rr::Json&)> take = {};  ///< takes what comes, in the place of the client
 };
 
-/// To what changes of a resource, of a client whose revision has a request for that: it is carried as the newest
-/// revision has it, a request that is answered for as long as its connection lasts, and made anew after each cut.
+/// To what changes of a resource, of a client whose revision has a request for that, or of the list of resources: it is
+/// carried as the newest revision has it, a request that is answered for as long as its connection lasts, and made anew
+/// after each cut.
 struct McpBridge::Subscription {
   Subscription(const boost::asio::any_io_executor& executor, rr::OrderedJson asked, std::string of)
       : id(std::move(asked)), uri(std::move(of)), again(executor) {}
 
   rr::OrderedJson id;  ///< of the client's request; null once that is answered
-  std::string uri;
+  std::string uri;     ///< empty: of the list
   Message listening = {};
   boost::asio::steady_timer again;
   std::chrono::seconds pause = first_pause;
+  bool has_begun = false;
   bool is_over = false;
 
+  const char* kind() const { return uri.empty() ? "resourcesListChanged" : "resourceSubscriptions"; }
+  rr::OrderedJson wanted() const {
+    if (uri.empty()) return true;
+    return rr::OrderedJson::array({uri});
+  }
   void end() {
     is_over = true;
     again.cancel();
@@ -137,6 +145,7 @@ void McpBridge::take(std::string_view line) {
 void McpBridge::end() {
   is_ending_ = true;
   for (const auto& [uri, subscription] : subscriptions_) subscription->end();
+  if (list_) list_->end();
   if (under_way_.empty()) return ended_();
   grace_.arm(last_grace);
 }
@@ -157,16 +166,19 @@ void McpBridge::subscribe(const rr::OrderedJson& id, const std::string& uri) {
     return refuse(id, internal_error, "more than " + std::to_string(most_at_once) + " subscriptions");
   const auto made = std::make_shared<Subscription>(executor_, id, uri);
   subscriptions_[uri] = made;
+  listen(made);
+}
+
+void McpBridge::listen(const std::shared_ptr<Subscription>& made) {
   made->listening.id = 1;
   made->listening.method = "subscriptions/listen";
   made->listening.revision = listening_revision;
-  made->listening.text =
-      rr::write_json({{"jsonrpc", "2.0"},
-                      {"id", made->listening.id},
-                      {"method", made->listening.method},
-                      {"params",
-                       {{"_meta", {{"io.modelcontextprotocol/protocolVersion", listening_revision}}},
-                        {"notifications", {{"resourceSubscriptions", rr::OrderedJson::array({uri})}}}}}});
+  made->listening.text = rr::write_json({{"jsonrpc", "2.0"},
+                                         {"id", made->listening.id},
+                                         {"method", made->listening.method},
+                                         {"params",
+                                          {{"_meta", {{"io.modelcontextprotocol/protocolVersion", listening_revision}}},
+                                           {"notifications", {{made->kind(), made->wanted()}}}}}});
   made->listening.take = [this, &subscription = *made](const rr::Json& news) { take_news(subscription, news); };
   boost::asio::co_spawn(executor_, keep_listening(made), boost::asio::detached);
 }
@@ -195,18 +207,22 @@ void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
   const auto method = text_in(news, {"method"});
   const auto& uri = subscription.uri;
   if (method == "notifications/subscriptions/acknowledged") {
-    const bool is_told = news["params"]["notifications"].contains("resourceSubscriptions");
+    const bool is_told = news["params"]["notifications"].contains(subscription.kind());
+    const bool is_first = !std::exchange(subscription.has_begun, true);
     const auto id = std::exchange(subscription.id, nullptr);
     if (is_told) subscription.pause = first_pause;
     if (!id.is_null() && is_told) return answer_empty(id);
     if (!id.is_null()) return give_up(id, uri, "there is no " + rr::quote(uri) + " whose changes can be told");
     if (!is_told) return subscription.listening.stream->close();  // not there yet
-  } else if (method != "notifications/resources/updated") {
+    if (uri.empty() && is_first) return;
+  } else if (method != "notifications/resources/updated" && method != list_changed) {
     const auto why = text_in(news, {"error", "message"});
     if (!why.empty() && !subscription.id.is_null()) give_up(std::exchange(subscription.id, nullptr), uri, why);
+    if (!why.empty() && uri.empty() && !subscription.has_begun) subscription.end();  // an older gateway
     return;
   }
   // After a cut nobody knows whether it has changed.
+  if (uri.empty()) return tell_(rr::write_json({{"jsonrpc", "2.0"}, {"method", list_changed}}));
   tell_(
       rr::write_json({{"jsonrpc", "2.0"}, {"method", "notifications/resources/updated"}, {"params", {{"uri", uri}}}}));
 }
@@ -296,6 +312,10 @@ void McpBridge::answer(Message& message, std::string text) {
   if (!json->contains("method")) message.is_answered = true;
   if (message.method == "initialize") revision_ = text_in(*json, {"result", "protocolVersion"});
   tell_(trimmed(std::move(text)));
+  if (message.method == "initialize" && !revision_.empty() && !list_ && !is_ending_) {
+    list_ = std::make_shared<Subscription>(executor_, nullptr, "");
+    listen(list_);
+  }
 }
 
 void McpBridge::refuse(const rr::OrderedJson& id, int code, std::string_view why) {

@@ -41,6 +41,7 @@ class McpBridge {
   struct Message;
   struct Subscription;
   void subscribe(const rr::OrderedJson& id, const std::string& uri);
+  void listen(const std::shared_ptr<Subscription>& subscription);
   void unsubscribe(const rr::OrderedJson& id, const std::string& uri);
   rr::awaitable<void> keep_listening(std::shared_ptr<Subscription> subscription);
   void give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why);
@@ -61,6 +62,7 @@ class McpBridge {
   std::multimap<std::string, std::shared_ptr<Message>> under_way_;  ///< by the JSON of their ids; "null" without one
   std::string revision_;                                            ///< that "initialize" came to
   std::map<std::string, std::shared_ptr<Subscription>> subscriptions_;  ///< by URI
+  std::shared_ptr<Subscription> list_;                                  ///< to the list of resources, once agreed
   rr::Deadline grace_;
   bool is_ending_ = false;
 };

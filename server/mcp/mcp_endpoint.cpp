@@ -165,6 +165,8 @@ rr::OrderedJson resource_result(const std::string& uri, const rr::OrderedJson& r
         {"contents",
          {{{"uri", uri}, {"mimeType", image->media_type}, {"blob", rr::encode_base64(rr::as_bytes(image->bytes))}}}}};
   const auto result = tool_result(read, false);
+  if (result["isError"].get<bool>())  // too long
+    throw McpRefusal{mcp_internal_error, result["structuredContent"]["error"]["message"].get<std::string>()};
   return {{"contents", {{{"uri", uri}, {"mimeType", "application/json"}, {"text", result["content"][0]["text"]}}}}};
 }
 

@@ -287,6 +287,7 @@ rr::awaitable<void> McpTools::follow_again(Listening& listening, std::set<std::s
 rr::awaitable<void> McpTools::tell_session(const AgentSubscriptions::Stream& session) {
   Listening listening;
   listening.wants_list = true;
+  listening.has_list_changed = !reply_.request().header("Last-Event-ID").empty();  // since a cut: nobody knows
   auto seen = session.changes();
   co_await follow_again(listening, session.uris());
   const auto must_follow = [&] {

@@ -96,7 +96,7 @@ const McpTools::Tool McpTools::tools[] = {
          "inputSchema": {"type": "object", "properties": {
            "device": {"type": "string"},
            "path": {"type": "string", "description": "SERVICE/OBJECT/PROPERTY"},
-           "value": {"anyOf": [{"type": "array"}, {"type": "boolean"}, {"type": "null"}, {"type": "number"}, {"type": "object"}, {"type": "string"}], "description": "as its schema says"},
+           "value": {"anyOf": [{"type": "array", "items": {}}, {"type": "boolean"}, {"type": "null"}, {"type": "number"}, {"type": "object"}, {"type": "string"}], "description": "as its schema says"},
            "why": {"type": "string", "maxLength": 500, "description": "what it is good for, for the person who is asked"},
            "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
            "required": ["device", "path", "value", "why"], "additionalProperties": false},
@@ -125,6 +125,13 @@ rr::OrderedJson McpTools::list() {
   return out;
 }
 
+/// Throws   rr::Exception: an argument that the tool does not have. What is misspelt must not be left out unheard.
+void expect_known(const Tool& tool, const rr::Json& arguments) {
+  const auto known = rr::OrderedJson::parse(tool.definition)["inputSchema"]["properties"];
+  for (const auto& [name, value] : arguments.items())
+    if (!known.contains(name)) refuse(rr::ErrorCode::invalid_argument, "the tool has no argument " + rr::quote(name));
+}
+
 bool McpTools::is_command(std::string_view name) {
   return std::any_of(std::begin(tools), std::end(tools),
                      [&](const Tool& each) { return each.name == name && each.is_command; });
@@ -134,13 +141,12 @@ rr::awaitable<std::optional<rr::OrderedJson>> McpTools::call(const std::string& 
   const auto* tool =
       std::find_if(std::begin(tools), std::end(tools), [&](const Tool& each) { return each.name == name; });
   if (tool == std::end(tools)) co_return std::nullopt;
-  auto read = JsonRequest::from_json(arguments);
-  if (!read) co_return std::nullopt;
-  const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   std::optional<rr::Error> error;
   rr::OrderedJson result;
   try {
-    result = co_await (this->*tool->perform)(request);
+    expect_known(*tool, arguments);
+    auto request = std::make_shared<const JsonRequest>(value_or_throw(JsonRequest::from_json(arguments)));
+    result = co_await (this->*tool->perform)(std::move(request));
   } catch (const rr::Exception& exception) {
     error = exception.error();
   }

@@ -153,7 +153,7 @@ asio::awaitable<bool> DeviceRecorder::follow_chosen(std::shared_ptr<ValueClient>
     }
     const auto is_it = [&each](const Followed& followed) { return is_same_place(each, followed.member); };
     if (std::any_of(followed_.begin(), followed_.end(), is_it)) continue;
-    const bool is_followed = co_await follow(client, each);
+    const bool is_followed = co_await follow(client, each, types);
     is_complete = is_complete && is_followed;
   }
   if (!record_->is_closed()) read(client, std::move(properties));
@@ -174,8 +174,8 @@ void DeviceRecorder::read(const std::shared_ptr<ValueClient>& client, std::vecto
       });
 }
 
-asio::awaitable<bool> DeviceRecorder::follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member) {
-  const std::shared_ptr<const rr::TypeRegistry> types = client->upstream()->types();
+asio::awaitable<bool> DeviceRecorder::follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member,
+                                             std::shared_ptr<const rr::TypeRegistry> types) {
   const std::weak_ptr<ServiceRecord> weak = record_;
   Followed followed{member};
   SampleHandler handler = [weak, member, types, has_ended = followed.has_ended](const SamplePtr& sample,

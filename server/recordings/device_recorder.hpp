@@ -41,7 +41,9 @@ class DeviceRecorder : public std::enable_shared_from_this<DeviceRecorder> {
   boost::asio::awaitable<void> record(std::shared_ptr<ValueClient> client);
   /// Chooses the members; those that are followed already go on. Returns whether all that is wanted is there.
   boost::asio::awaitable<bool> follow_chosen(std::shared_ptr<ValueClient> client);
-  boost::asio::awaitable<bool> follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member);
+  /// `types`  that `member` is of.
+  boost::asio::awaitable<bool> follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member,
+                                      std::shared_ptr<const rr::TypeRegistry> types);
   void read(const std::shared_ptr<ValueClient>& client, std::vector<RecordedMemberPlace> properties);
   bool has_one_ended() const;
   void leave();

@@ -355,6 +355,10 @@ rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient>
     co_return;
   }
   if (client.login_) client.leave_login();
+  if (client.is_closed()) {  // it could not be told
+    upstream->close();
+    co_return;
+  }
   client.login_ = upstream;
   if (client.service_) client.move_to(upstream);
   upstream->keep_open(service->device()->retry());

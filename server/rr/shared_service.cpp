@@ -1,5 +1,7 @@
 #include "server/rr/shared_service.hpp"
 
+#include <map>
+
 #include "server/log/log.hpp"
 #include "server/rr/shared_client.hpp"
 
@@ -139,8 +141,11 @@ void SharedService::withdraw() {
   const auto hosted = std::exchange(hosted_, nullptr);
   if (!hosted) return;
   for (auto* board : boards_) board->withdraw(*hosted);
-  const auto clients = clients_;  // each removes itself
-  for (auto* client : clients) client->close_service();
+  // Each removes itself; what one gives back may go to another, which may be lost by that.
+  std::map<SharedClient*, std::shared_ptr<rr::StreamDriver>> clients;
+  for (auto* client : clients_) clients.emplace(client, client->shared_from_this());
+  for (const auto& [client, kept] : clients)
+    if (clients_.contains(client)) client->close_service();
 }
 
 /// While it has clients, also such as use sessions of their own, the gateway hears what becomes of the service.

@@ -141,7 +141,9 @@ void JsonOperations::review() {
     rr::add_key(news, "state") = "ended";
     rr::add_key(news, "detail") = allowed.error().message;
     outbox_->add(it->second.opening.token(), news_of(it->first, news));
-    it = open_.erase(it);
+    const auto id = it->first;
+    open_.erase(it);  // which may end others, too
+    it = open_.upper_bound(id);
   }
   if (const auto own = own_) own->review_locks();
 }

@@ -151,14 +151,15 @@ Response HttpAccess::refusal(const Request& request, const rr::Error& error) con
   rr::add_key(problem, "error") = {{"name", error.qualified_name()}, {"message", error.message}};
   auto response = text_response(status, "application/problem+json", rr::write_json(problem) + "\n");
   response.set("Cache-Control", "no-store");
-  if (status == 401 && state.users && request.header("X-Requested-With").empty())
-    response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
+  // Clients of agents look at the first alone.
   if (status == 401 && (state.tokens || state.jwt)) {
     std::string challenge = "Bearer realm=\"rrgate\"";
     if (request.path() == mcp_path && state.config.jwt.discovers && !origin_of(request).empty())
       challenge += ", resource_metadata=\"" + origin_of(request) + std::string(mcp_metadata_path) + "\"";
     response.set("WWW-Authenticate", std::move(challenge));
   }
+  if (status == 401 && state.users && request.header("X-Requested-With").empty())
+    response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
   if (status == 503) response.set("Retry-After", "2");
   return response;
 }

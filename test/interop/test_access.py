@@ -32,7 +32,7 @@ def test_everybody_sees_what_he_may(guarded):
     for path in ("/api/v1/devices", "/api/v1/devices/interop", BASE, BASE + "/p_double", "/metrics"):
         refused = ask(port, "GET", path)
         assert refused.status == 401, path
-        assert refused.headers.get_all("WWW-Authenticate") == ['Basic realm="rrgate", charset="UTF-8"', 'Bearer realm="rrgate"']
+        assert refused.headers.get_all("WWW-Authenticate") == ['Bearer realm="rrgate"', 'Basic realm="rrgate", charset="UTF-8"']
         assert refused.headers["Content-Type"] == "application/problem+json"
     for path in ("/healthz", "/readyz"):
         assert ask(port, "GET", path).status == 200, path

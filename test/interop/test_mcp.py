@@ -5,6 +5,7 @@ import threading
 import time
 
 import pytest
+from mcp import MCPError
 
 from agents import ORDER, call, hostile_robot, lose_role, meanwhile, records, with_agent, with_tokens
 from http_api import ask
@@ -167,3 +168,13 @@ def test_without_mcp_in_the_configuration_there_are_no_agents(node, tmp_path):
     made.stop()
     assert refused.status == 404
     assert 'no "mcp"' in refused.json["detail"]
+
+
+def test_a_value_that_is_too_long_is_no_resource(device, tmp_path):
+    gateway, port = start_gateway(tmp_path, device, device={"mode": "shared"}, mcp={})
+    try:
+        assert ask(port, "PUT", "/p_doubles", [0.125] * 60_000).status == 204
+        with pytest.raises(MCPError, match="longer than"):
+            with_agent(port, lambda session: session.read_resource("rrgate://interop/interop/p_doubles"))
+    finally:
+        gateway.stop()

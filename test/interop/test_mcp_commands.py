@@ -259,6 +259,8 @@ def test_a_dry_run_says_what_would_be_sent_and_sends_nothing(lab):
     told = made.set(1, dry_run=True).structured_content
     assert told["would_send"] == {"speed": 1} and told["would_ask_a_person"] is True and told["would_hold_lease"] is True
     assert made.set(3, dry_run=True).is_error
+    assert made.refusal(made.set(1, dryRun=True)) == "the tool has no argument 'dryRun'"
+    assert "id" in made.refusal(made.set(1, id={}))
     assert made.has_never_moved() and not made.approvals()
 
 

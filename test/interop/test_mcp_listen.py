@@ -216,14 +216,17 @@ def test_a_stream_is_of_a_session_which_ends_with_its_delete(site):
     assert "Mcp-Session-Id" in ask(port, "POST", "/mcp", subscribe).json["error"]["message"]
     assert ask(port, "POST", "/mcp", subscribe, session).json["result"] == {}
 
-    def stream():
+    def stream(**more):
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-        connection.request("GET", "/mcp", headers={**session, "Accept": "text/event-stream"})
+        connection.request("GET", "/mcp", headers={**session, "Accept": "text/event-stream", **more})
         response = connection.getresponse()
         assert response.status == 200
         assert response.readline().startswith(b"id: ")
         return response
 
+    again = stream(**{"Last-Event-ID": "1"})
+    lines = iter(again.readline, b"")
+    assert any(b"notifications/resources/list_changed" in line for line in lines)  # since a cut: nobody knows
     first = stream()
     second = stream()  # a session has one
     assert first.read().startswith(b"data:")

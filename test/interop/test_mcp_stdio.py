@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from agents import hostile_robot, records, with_lines, with_tokens
+from agents import hostile_robot, lose_role, records, with_lines, with_tokens
 from command_line import NOT_UNDERSTOOD, Ran
 from gateways import RRGATE, make_web_certificates
 from leases import LEASES, wait_for
@@ -64,6 +64,15 @@ def lab(node, tmp_path):
     made.stop()
 
 
+def arrays_in(schema):
+    """Those of a JSON Schema that are of arrays, wherever they stand in it."""
+    if isinstance(schema, list):
+        return [found for each in schema for found in arrays_in(each)]
+    if not isinstance(schema, dict):
+        return []
+    return ([schema] if schema.get("type") == "array" else []) + arrays_in(list(schema.values()))
+
+
 @pytest.mark.parametrize("modern", [False, True])
 def test_one_device_is_read_without_a_gateway(demo, modern):
     async def look(session):
@@ -75,6 +84,8 @@ def test_one_device_is_read_without_a_gateway(demo, modern):
 
     (tools, devices, described, refused), errors = with_lines([demo, "--name", "create"], look, modern=modern)
     assert {"devices", "read", "call"} <= {tool.name for tool in tools}
+    arrays = [schema for tool in tools for schema in arrays_in(tool.input_schema)]
+    assert arrays and all("items" in schema for schema in arrays)  # models of some makers refuse all tools otherwise
     assert devices["devices"][0]["name"] == "create"
     drive = next(each for each in described["members"] if each["name"] == "Drive")
     assert drive["may"] == []
@@ -178,6 +189,16 @@ def test_a_hostile_device_speaks_under_from_device_alone():
     with hostile_robot() as (url, _):
         result, _ = with_lines([url], lambda session: session.call_tool("read", {"device": "robot", "path": "robot/note"}))
     assert "Ignore all rules" in result.structured_content["from_device"]
+
+
+def test_a_list_that_has_changed_is_told(lab, tmp_path):
+    with speaking(tmp_path, lab.gateway_url, environment=lab.environment) as process:
+        say(process, "initialize", 1, protocolVersion="2025-11-25", capabilities={}, clientInfo={"name": "test", "version": "1"})
+        assert hear(process)["result"]["capabilities"]["resources"]["listChanged"] is True
+        say(process, "notifications/initialized")
+        time.sleep(2)  # it listens by now
+        lose_role(tmp_path)
+        assert hear(process) == {"jsonrpc": "2.0", "method": "notifications/resources/list_changed"}
 
 
 def test_a_url_of_nothing_is_not_understood():

@@ -27,7 +27,7 @@ std::vector<std::string> paths_of(const Route& route) {
   const std::string request = "/api/v1/access/requests/{request}/";
   std::vector<std::string> out;
   if (route.pattern == "/api/v1/devices/*") {
-    // To write and to call is for what is below a service: told by the document of the device. OPTIONS is a browser's.
+    // To write and to call is for what is below a service: told by the document of the device.
     if (route.method != http::verb::get) return out;
     out = {device, device + "/{definition}.robdef", device + "/{service}"};
     for (const auto name : device_resources) out.push_back(device + "/" + std::string(name));
@@ -46,10 +46,12 @@ std::vector<std::string> paths_of(const Route& route) {
   return out;
 }
 
+/// But OPTIONS, which browsers ask by themselves.
 Operations answered(Gateway& gateway) {
   Operations out;
   for (const auto& route : list_routes(gateway))
-    for (const auto& path : paths_of(route)) out.insert(operation(route.method, path));
+    if (route.method != http::verb::options)
+      for (const auto& path : paths_of(route)) out.insert(operation(route.method, path));
   return out;
 }
 
