@@ -31,10 +31,6 @@ void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection ne
          rr::quote(member.name) + (is_read_only ? " can only be read" : " can only be written"));
 }
 
-rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form) {
-  return value_or_throw(rr::value_to_json(value, target.member->type, target.types(), form, target.member->name));
-}
-
 rr::Value value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
                    const std::string& name, const rr::JsonForm& form) {
   return value_or_throw(rr::value_from_json(request.at("value"), type, target.types(), form, name));

@@ -29,7 +29,6 @@ void expect_object(const Target& target, const std::string& message);
 /// Throws   read_only_member, write_only_member: the member has the direction `never`.
 void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection never);
 
-rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form);
 /// The request's "value", as one of `type`. `name`  of errors.
 rr::Value value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
                    const std::string& name, const rr::JsonForm& form);

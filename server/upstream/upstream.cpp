@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/session/client/unread_reply.hpp"
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
@@ -281,6 +282,8 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
     if (result || !self) return done(std::move(result));
     if (!self->connection_) return done(self->lost_error());
     if (self->is_lost()) return done(self->lost_error(result.error()));
+    // The device has done what it was asked for: clients must not take that for refused, and ask again.
+    if (rr::is_unread_reply(result.error())) return done(rr::protocol_error(result.error().message));
     done(std::move(result));
   };
   const auto& path = path_of(called);
@@ -453,8 +456,9 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
   const auto index = found->second.index;
   if (called.kind == rr::CallKind::generator_next) {
     auto stepped = [weak = weak_from_this(), key, life, done = std::move(done)](rr::Result<rr::Value> value) {
-      // One that takes too long is still at work there, and is to be ended.
-      const bool has_ended = !value && value.error().code != rr::ErrorCode::request_timeout;
+      // One that takes too long, or whose value can't be read, is still there, and is to be ended.
+      const bool has_ended =
+          !value && value.error().code != rr::ErrorCode::request_timeout && !rr::is_unread_reply(value.error());
       if (const auto self = weak.lock(); self && has_ended && !life.expired()) self->generators_.erase(key);
       done(std::move(value));
     };

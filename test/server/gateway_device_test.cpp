@@ -13,13 +13,15 @@ namespace {
 
 struct Robot {
   std::shared_ptr<rr::Service> service;
-  bool is_closed = false;  ///< the generator whose values come late
+  bool is_closed = false;  ///< the generator whose values come late, or are none for JSON
+  int spelled = 0;         ///< texts that JSON has no form for
   std::vector<std::shared_ptr<rr::LateCall>> late;
   rr::RunningNode node;
 
   explicit Robot(const rr::SecurityPolicy& policy = {})
       : service(rr::Service::from_text({"service test.robot\nobject Robot\nproperty int32 one [readonly]\n"
                                         "function void fail(uint16 code)\nfunction int32{generator} hang()\n"
+                                        "function string spell()\nfunction string{generator} spells()\n"
                                         "event news(string text)\nend\n"},
                                        "Robot", "Robot")),
         node([this, &policy](rr::Node& made) {
@@ -34,6 +36,19 @@ struct Robot {
             return generator;
           });
           service->set_security(policy);
+          const std::string latin = "\xfc";  // no UTF-8
+          service->function("spell", [this, latin] {
+            ++spelled;
+            return latin;
+          });
+          service->generator("spells", [this, latin] {
+            rr::Generator generator;
+            generator.next = [latin](const rr::Value&) -> rr::Result<std::optional<rr::Value>> {
+              return rr::Value(latin);
+            };
+            generator.close = [this] { is_closed = true; };
+            return generator;
+          });
           made.add(service);
         }) {}
 
@@ -54,12 +69,14 @@ std::function<void(Config&)> with(Robot& robot) {
   };
 }
 
+void call(TestClient& client, const std::string& function, const std::string& body) {
+  client.send("POST /api/v1/devices/robot/Robot/" + function +
+              " HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
+              std::to_string(body.size()) + "\r\n\r\n" + body);
+}
+
 unsigned status_of_failure(TestClient& client, rr::ErrorCode code) {
-  const auto body = nlohmann::json{{"code", static_cast<int>(code)}}.dump();
-  client.send(
-      "POST /api/v1/devices/robot/Robot/fail HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-      "Content-Length: " +
-      std::to_string(body.size()) + "\r\n\r\n" + body);
+  call(client, "fail", nlohmann::json{{"code", static_cast<int>(code)}}.dump());
   return client.receive_response().status;
 }
 
@@ -102,9 +119,7 @@ TEST_CASE("a generator whose value comes too late for HTTP is ended at the devic
     config.timeouts.request = 200ms;
   });
   TestClient client(gateway.port());
-  client.send(
-      "POST /api/v1/devices/robot/Robot/hang HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-      "Content-Length: 2\r\n\r\n{}");
+  call(client, "hang", "{}");
   CHECK_THAT(client.receive_until("\n\r\n0\r\n\r\n"), Catch::Contains("RequestTimeout"));
   const auto end = std::chrono::steady_clock::now() + 10s;
   const auto is_closed = [&] {
@@ -113,6 +128,23 @@ TEST_CASE("a generator whose value comes too late for HTTP is ended at the devic
       return robot.is_closed;
     });
   };
+  while (!is_closed() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  CHECK(is_closed());
+}
+
+TEST_CASE("what a device has done is not told as refused because JSON has no form for its answer") {
+  Robot robot;
+  TestGateway gateway(0, with(robot));
+  TestClient client(gateway.port());
+  call(client, "spell", "{}");
+  const auto answer = client.receive_response();
+  CHECK(answer.status == 502);
+  CHECK_THAT(answer.body, Catch::Contains("RobotRaconteur.ProtocolError") && Catch::Contains("is not UTF-8"));
+  CHECK(robot.node.ask([&](rr::Node&) { return robot.spelled; }) == 1);
+  call(client, "spells", "{}");
+  CHECK_THAT(client.receive_until("\n\r\n0\r\n\r\n"), Catch::Contains("RobotRaconteur.ProtocolError"));
+  const auto end = std::chrono::steady_clock::now() + 10s;
+  const auto is_closed = [&] { return robot.node.ask([&](rr::Node&) { return robot.is_closed; }); };
   while (!is_closed() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
   CHECK(is_closed());
 }

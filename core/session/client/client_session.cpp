@@ -6,6 +6,7 @@
 #include "core/member/arguments.hpp"
 #include "core/member/error_entry.hpp"
 #include "core/member/member_table.hpp"
+#include "core/session/client/unread_reply.hpp"
 #include "core/support/random.hpp"
 #include "core/support/sort.hpp"
 
@@ -344,7 +345,13 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
     return handle_type_name_reply(entry, id, std::move(pending.path), now);
   if (pending.type == EntryType::client_session_op_req)
     return handle_session_op_reply(message, entry, id, std::move(pending.path), now);
-  emit(Completed{id, read_reply(message, entry, pending)});
+  auto result = read_reply(message, entry, pending);
+  if (!result) {
+    auto error = result.error();
+    error.sub_name = unread_reply;
+    result = std::move(error);
+  }
+  emit(Completed{id, std::move(result)});
   if (pending.type == EntryType::wire_connect_req) handle_wire_connected(pending, id);
 }
 

@@ -52,6 +52,12 @@ std::string_view state_name(const rr::Error* error) {
   return error->code == rr::ErrorCode::invalid_state ? "closed" : "connection_lost";
 }
 
+rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form) {
+  auto json = rr::value_to_json(value, target.member->type, target.types(), form, target.member->name);
+  if (!json) refuse(rr::ErrorCode::protocol_error, json.error().message);
+  return std::move(*json);
+}
+
 std::size_t item_bytes_of(const Target& target) {
   if (const auto size = rr::item_size(target.member->type.type)) return size;
   const auto* entity = target.types().find_entity(target.member->type.qualified_name);

@@ -26,6 +26,10 @@ rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::Membe
 /// "connected", "connection_lost", "closed" (a pipe, by the device): what listeners hear beside samples.
 std::string_view state_name(const rr::Error* error);
 
+/// What the device has answered for the target's member. Throws   rr::Exception, protocol_error: it can't be told as
+/// JSON, though the device has done what it was asked for.
+rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form);
+
 using Shape = std::vector<std::uint64_t>;
 
 /// Bytes of an item of a memory; 0 where its items have no fixed size.

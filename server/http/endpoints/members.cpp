@@ -10,19 +10,12 @@ namespace rrgate {
 
 namespace {
 
-rr::OrderedJson to_json(const ObjectRequest& request, const Target& target, const rr::Value& value,
-                        const rr::TypeDefinition& type) {
-  auto json = rr::value_to_json(value, type, target.types(), request.form(), target.member->name);
-  if (!json) throw rr::Exception(json.error());
-  return std::move(*json);
-}
-
 /// A value of the member: as an image, where that is wanted and it is one, or as JSON. Throws   rr::Exception.
 rr::awaitable<Response> value_response(const ObjectRequest& request, const Target& target, const rr::Value& value) {
   const auto& type = target.member->type;
   const auto wanted = request.wanted_image();
   if (wanted.empty() || !is_image_type(type, target.types())) {
-    const auto json = to_json(request, target, value, type);
+    const auto json = to_json(target, value, request.form());
     co_return co_await request.value_response(json);
   }
   const auto work = value_or_throw(prepare_image(value, type, target.types(), wanted));
@@ -70,7 +63,7 @@ rr::awaitable<Response> answer_function(const ObjectRequest& request, const Targ
   if (!request.wanted_image().empty() && is_image_type(member.type, target.types()))
     co_return co_await value_response(request, target, value);
   auto result = rr::OrderedJson::object();
-  rr::add_key(result, "result") = to_json(request, target, value, member.type);
+  rr::add_key(result, "result") = to_json(target, value, request.form());
   co_return co_await request.value_response(result);
 }
 
@@ -217,7 +210,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     const auto bytes = rr::as_text(payload_of(items));
     co_return text_response(200, "application/octet-stream", std::string(bytes));
   }
-  const auto json = to_json(request, target, items, member.type);
+  const auto json = to_json(target, items, request.form());
   co_return co_await request.value_response(json);
 }
 

@@ -217,7 +217,10 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
   const auto gone = std::make_shared<bool>(false);
   const auto head = stream_head(as_events ? "text/event-stream" : "application/x-ndjson");
   auto failed = co_await writer.begin(head);
-  writer.watch([gone] { *gone = true; });
+  writer.watch([gone, client = target.client, generator] {
+    *gone = true;
+    client->drop_generator(generator);  // the step that is at work may take its time
+  });
   bool has_ended = false;
   while (!failed && !*gone && !has_ended) {
     rr::OrderedJson line;
@@ -225,9 +228,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
       auto step = target.request(rr::CallKind::generator_next);
       step.generator = generator;
       const auto value = co_await target.client->ask(std::move(step));
-      auto json = rr::value_to_json(value, member.type, target.types(), request.form(), member.name);
-      if (!json) throw rr::Exception(json.error());
-      line = std::move(*json);
+      line = to_json(target, value, request.form());
     } catch (const rr::Exception& exception) {
       has_ended = true;
       if (exception.error().code == rr::ErrorCode::stop_iteration) break;
