@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/support/utf8.hpp"
 #include "server/json/json_builder.hpp"
 
 namespace rr {
@@ -82,6 +83,7 @@ class CborReader {
   bool read_string(const CborHead& head, Out& out);
   template <class Out>
   bool read_piece(const CborHead& head, Out& out);
+  bool read_text(const CborHead& head, std::string& out);
   bool read_bytes(const CborHead& head, std::optional<std::uint64_t> tag);
   bool fail_here() { return builder_.fail("is no CBOR at byte " + std::to_string(item_at_)); }
 
@@ -129,7 +131,7 @@ bool CborReader::read_item() {
       return read_bytes(head, {});
     case CborType::text: {
       std::string text;
-      return read_string(head, text) && builder_.add_value(std::move(text));
+      return read_text(head, text) && builder_.add_value(std::move(text));
     }
     case CborType::array:
       return begin(head, Json::array());
@@ -148,7 +150,7 @@ bool CborReader::read_key() {
   std::string key;
   if (!read_head(head)) return false;
   if (head.type != CborType::text) return fail_here();
-  return read_string(head, key) && builder_.set_key(std::move(key));
+  return read_text(head, key) && builder_.set_key(std::move(key));
 }
 
 bool CborReader::read_simple(const CborHead& head) {
@@ -216,6 +218,12 @@ bool CborReader::read_piece(const CborHead& head, Out& out) {
   out.insert(out.end(), piece.begin(), piece.end());
   at_ += piece.size();
   return true;
+}
+
+bool CborReader::read_text(const CborHead& head, std::string& out) {
+  const auto begin = item_at_;
+  if (!read_string(head, out)) return false;
+  return is_utf8(out) || builder_.fail("has a text that is not UTF-8 at byte " + std::to_string(begin));
 }
 
 bool CborReader::read_bytes(const CborHead& head, std::optional<std::uint64_t> tag) {

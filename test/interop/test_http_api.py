@@ -222,6 +222,26 @@ def test_cbor(gateway):
     assert ask(gateway, "GET", "/p_doubles").json == [2.0]
 
 
+def test_streams_are_text_also_for_readers_of_cbor(gateway):
+    ask(gateway, "POST", "/publish_state", {"value": [1.5, 2]})
+    stream = Stream(gateway, "/state", {"Accept": "text/event-stream, application/cbor"})
+    assert stream.next()[2] == [1.5, 2]
+    stream.close()
+
+
+def test_cbor_whose_text_is_not_utf8_is_refused(gateway):
+    cbor = {"Content-Type": "application/cbor"}
+    assert ask(gateway, "PUT", "/p_string", "grün").status == 204
+    assert ask(gateway, "PUT", "/p_string_map", {"grün": "yes"}).status == 204
+    for path, body in (("/p_string", b"\x61\xfc"), ("/p_string_map", b"\xa1\x61\xfc\x61a"), ("/p_string_map", b"\xa1\x61a\x61\xfc")):
+        refused = ask(gateway, "PUT", path, body, cbor)
+        assert refused.status == 400 and "not UTF-8" in refused.json["detail"], refused.body
+    assert ask(gateway, "GET", "/p_string").json == "grün"
+    assert ask(gateway, "GET", "/p_string_map").json == {"grün": "yes"}
+    assert ask(gateway, "PUT", "/p_string", b"\x62\xc3\xbc", cbor).status == 204
+    assert ask(gateway, "GET", "/p_string").json == "ü"
+
+
 def test_documents(gateway):
     base = "/api/v1/devices/interop"
     answer = ask(gateway, "GET", "/openapi.json", base=base)

@@ -22,6 +22,7 @@ struct Robot {
       : service(rr::Service::from_text({"service test.robot\nobject Robot\nproperty int32 one [readonly]\n"
                                         "function void fail(uint16 code)\nfunction int32{generator} hang()\n"
                                         "function string spell()\nfunction string{generator} spells()\n"
+                                        "function int32[]{generator} rows()\n"
                                         "event news(string text)\nend\n"},
                                        "Robot", "Robot")),
         node([this, &policy](rr::Node& made) {
@@ -49,6 +50,12 @@ struct Robot {
             generator.close = [this] { is_closed = true; };
             return generator;
           });
+          service->generator("rows", [] {
+            return [left = 2]() mutable -> std::optional<std::vector<std::int32_t>> {
+              if (left-- == 0) return std::nullopt;
+              return std::vector<std::int32_t>{1, left};
+            };
+          });
           made.add(service);
         }) {}
 
@@ -69,10 +76,11 @@ std::function<void(Config&)> with(Robot& robot) {
   };
 }
 
-void call(TestClient& client, const std::string& function, const std::string& body) {
+/// `headers` are whole lines with their line ends.
+void call(TestClient& client, const std::string& function, const std::string& body, const std::string& headers = {}) {
   client.send("POST /api/v1/devices/robot/Robot/" + function +
               " HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
-              std::to_string(body.size()) + "\r\n\r\n" + body);
+              std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
 }
 
 unsigned status_of_failure(TestClient& client, rr::ErrorCode code) {
@@ -130,6 +138,16 @@ TEST_CASE("a generator whose value comes too late for HTTP is ended at the devic
   };
   while (!is_closed() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
   CHECK(is_closed());
+}
+
+TEST_CASE("the lines of a generator are JSON for clients that take CBOR, too") {
+  Robot robot;
+  TestGateway gateway(0, with(robot));
+  TestClient client(gateway.port());
+  call(client, "rows", "{}", "Accept: application/cbor\r\n");
+  const auto answer = client.receive_until("\r\n0\r\n\r\n");
+  CHECK_THAT(answer, Catch::Contains("application/x-ndjson"));
+  CHECK_THAT(answer, Catch::Contains("\n[1,1]\n") && Catch::Contains("\n[1,0]\n"));
 }
 
 TEST_CASE("what a device has done is not told as refused because JSON has no form for its answer") {

@@ -84,6 +84,13 @@ std::string event_text(const std::string& json, std::uint64_t number, bool has_n
   return (has_number ? "id: " + std::to_string(number) + "\n" : "") + "data: " + json + "\n\n";
 }
 
+/// Streams are text, whatever else the client takes: arrays of numbers don't become the bytes of CBOR.
+rr::JsonForm text_form(const ObjectRequest& request) {
+  auto form = request.form();
+  form.has_bytes = false;
+  return form;
+}
+
 Response stream_head(std::string_view content_type) {
   Response head;
   head.set("Content-Type", std::string(content_type)).set("Cache-Control", "no-store");
@@ -99,7 +106,7 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   const auto outbox = std::make_shared<Outbox>(writer.executor(), writer.memory().sibling());
   const bool is_wire = member.kind == rr::MemberKind::wire;
   const bool is_event = member.kind == rr::MemberKind::event;
-  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = request.form(),
+  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = text_form(request),
                            memory = &request.gateway().memory()](const SamplePtr& sample, const rr::Error* error) {
     if (!sample) return outbox->add(state_text(error), false);
     const auto& json = sample_text(*sample, member, *types, form, *memory);
@@ -221,6 +228,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     *gone = true;
     client->drop_generator(generator);  // the step that is at work may take its time
   });
+  const auto form = text_form(request);
   bool has_ended = false;
   while (!failed && !*gone && !has_ended) {
     rr::OrderedJson line;
@@ -228,7 +236,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
       auto step = target.request(rr::CallKind::generator_next);
       step.generator = generator;
       const auto value = co_await target.client->ask(std::move(step));
-      line = to_json(target, value, request.form());
+      line = to_json(target, value, form);
     } catch (const rr::Exception& exception) {
       has_ended = true;
       if (exception.error().code == rr::ErrorCode::stop_iteration) break;

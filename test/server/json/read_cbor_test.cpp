@@ -76,6 +76,18 @@ TEST_CASE("cbor: what is malformed says where") {
   CHECK(shown("c11a514b67b0") == "CBOR has the tag 1 before what is no bytes (byte 1)");
 }
 
+TEST_CASE("cbor: texts and keys are UTF-8") {
+  CHECK(shown("62c3bc") == "\"\xc3\xbc\"");
+  CHECK(shown("7f62c3bc6161ff") ==
+        "\"\xc3\xbc"
+        "a\"");
+  CHECK(shown("61ff") == "CBOR has a text that is not UTF-8 at byte 0");
+  CHECK(shown("8261 61 62c328") == "CBOR has a text that is not UTF-8 at byte 3");
+  CHECK(shown("7f6161 61ff ff") == "CBOR has a text that is not UTF-8 at byte 0");
+  CHECK(shown("a1 62eda0 01") == "CBOR has a text that is not UTF-8 at byte 1");
+  CHECK(shown("d84041ff") == R"({"bytes":[255],"subtype":64})");
+}
+
 TEST_CASE("cbor: nothing nests without end") {
   const std::size_t count = 1'000'000;
   for (const auto* first : {"c6", "d840", "d9d9f7", "7f", "5f", "81", "9f", "a160", "bf60"}) {
