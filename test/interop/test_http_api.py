@@ -77,6 +77,9 @@ def test_what_is_refused(gateway):
     refusal(404, "nothing is below it", "GET", "/p_double/x")
     refusal(406, "text/event-stream", "GET", "/changed")
     refusal(501, "WebSocket", "POST", "/ask", {})
+    for accept in ("application/json", "text/event-stream", "multipart/x-mixed-replace"):
+        refusal(501, "only be sent to", "GET", "/taken", headers={"Accept": accept})
+    assert refusal(405, "PUT", "GET", "/target", headers={"Accept": "text/event-stream"}).headers["Allow"] == "PUT"
     refusal(501, "WebSocket", "POST", "/scale", {"factor": 2})
     refusal(403, "origin", "GET", "/p_double", headers={"Origin": "http://elsewhere.example"})
     error = refusal(422, "out of jam", "POST", "/fail", {"kind": "custom", "text": "out of jam"}).json["error"]
@@ -125,6 +128,13 @@ def test_memories(gateway):
     assert (beyond.status, beyond.headers["Content-Range"]) == (416, "bytes */10")
     within = ask(gateway, "GET", "/m_large", headers={"Accept": "application/octet-stream", "Range": "bytes=9-16"})
     assert within.status == 206 and len(within.body) == 8
+    part = ask(gateway, "GET", "/m_fixed?offset=7&count=2", headers={"Accept": "application/octet-stream"})
+    assert (part.status, part.body) == (200, bytes([7, 8]))
+    rest = ask(gateway, "GET", "/m_fixed?offset=7", headers={"Accept": "application/octet-stream"})
+    assert (rest.status, rest.body) == (200, bytes([7, 8, 9]))
+    first = ask(gateway, "GET", "/m_large?count=1", headers={"Accept": "application/octet-stream"})
+    assert (first.status, first.body) == (200, bytes(8))
+    assert ask(gateway, "GET", "/m_fixed?count=11", headers={"Accept": "application/octet-stream"}).status == 400
     assert ask(gateway, "GET", "/m_large").json[-1] == 49_999
     assert ask(gateway, "GET", "/m_numbers?offset=1,2").status == 400
     assert ask(gateway, "GET", "/m_numbers?offset=99&count=2").status == 400

@@ -201,10 +201,11 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     co_return request.written_response();
   }
 
-  const bool is_flat = shape.size() == 1 && !rr::is_multidim(member.type);
-  if (request.wanted() == BodyForm::bytes && is_flat && item_bytes_of(target) > 0)
-    co_return co_await answer_memory_bytes(request, target, shape[0], item_bytes_of(target));
   const auto count = read_shape(request, "count", shape.size());
+  const bool is_flat = shape.size() == 1 && !rr::is_multidim(member.type);
+  const bool is_whole = !position && !count;
+  if (request.wanted() == BodyForm::bytes && is_whole && is_flat && item_bytes_of(target) > 0)
+    co_return co_await answer_memory_bytes(request, target, shape[0], item_bytes_of(target));
   const auto items = co_await read_items(target, shape, position, count);
   if (request.wanted() == BodyForm::bytes) {
     const auto bytes = rr::as_text(payload_of(items));
@@ -242,8 +243,13 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
       break;
     case rr::MemberKind::event:
     case rr::MemberKind::pipe:
-      response = problem_response(406, "an " + std::string(member_kind_name(target.member->kind)) +
-                                           " comes as a stream: ask for it with Accept: text/event-stream");
+      if (target.member->direction() == rr::MemberDirection::writeonly) {
+        response = problem_response(501, "the pipe can only be sent to, which HTTP can't; use a WebSocket");
+        break;
+      }
+      response =
+          problem_response(406, std::string(target.member->kind == rr::MemberKind::pipe ? "a pipe" : "an event") +
+                                    " comes as a stream: ask for it with Accept: text/event-stream");
       break;
     default:
       response = problem_response(501, "a " + std::string(member_kind_name(target.member->kind)) +

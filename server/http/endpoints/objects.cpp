@@ -26,8 +26,9 @@ enum class Answer : std::uint8_t { description, lease, images, topic, generator,
 Answer answer_to(const ObjectRequest& request, const Target& target) {
   if (!target.member) return request.option("lease") ? Answer::lease : Answer::description;
   const auto& member = *target.member;
-  const bool is_topic = member.kind == rr::MemberKind::event || member.kind == rr::MemberKind::pipe ||
-                        (member.kind == rr::MemberKind::wire && member.direction() != rr::MemberDirection::writeonly);
+  const bool can_receive = member.direction() != rr::MemberDirection::writeonly;
+  const bool is_topic = member.kind == rr::MemberKind::event ||
+                        ((member.kind == rr::MemberKind::pipe || member.kind == rr::MemberKind::wire) && can_receive);
   const bool is_motion = is_topic && member.kind != rr::MemberKind::event && is_image_type(member.type, target.types());
   if (is_motion && request.is_read() && request.wants_motion()) return Answer::images;
   if (is_topic && request.is_read() && request.wants_events()) return Answer::topic;
