@@ -15,9 +15,32 @@ interface Server {
   address(): AddressInfo;
   close(done?: () => void): void;
 }
-const { WebSocketServer } = createRequire(new URL("../../wasm-client/package.json", import.meta.url))("ws") as {
+const { WebSocket: Base, WebSocketServer } = createRequire(new URL("../../wasm-client/package.json", import.meta.url))(
+  "ws",
+) as {
+  WebSocket: new (url: string, protocols: string[], options: object) => object;
   WebSocketServer: new (options: object) => Server;
 };
+
+/** As Node's own: whoever uses it closes with the codes alone that the standard leaves to pages. */
+class StrictWebSocket extends Base {
+  constructor(url: string, { protocols, headers }: { protocols: string[]; headers: object }) {
+    super(url, protocols, { headers });
+    return new Proxy(this, {
+      get: (socket, name) => {
+        const value: unknown = Reflect.get(socket, name);
+        if (typeof value !== "function") return value;
+        return (...args: unknown[]): unknown => {
+          const [code = 1000] = args as [number?];
+          if (name === "close" && code !== 1000 && !(code >= 3000 && code <= 4999))
+            throw new DOMException(`invalid code ${code}`, "InvalidAccessError");
+          return Reflect.apply(value, socket, args);
+        };
+      },
+      set: (socket, name, value) => Reflect.set(socket, name, value),
+    });
+  }
+}
 
 let server: Server;
 let url: string;
@@ -25,6 +48,7 @@ let upgrade: { url: string; headers: Record<string, string | undefined> };
 let greet: (socket: Socket) => void;
 
 beforeEach(async () => {
+  vi.stubGlobal("WebSocket", StrictWebSocket);
   greet = () => undefined;
   server = new WebSocketServer({
     host: "127.0.0.1",
@@ -38,7 +62,10 @@ beforeEach(async () => {
   await new Promise((resolve) => server.on("listening", resolve as () => void));
   url = `ws://127.0.0.1:${server.address().port}/devices/create?service=Create`;
 });
-afterEach(() => new Promise<void>((resolve) => server.close(() => resolve())));
+afterEach(() => {
+  vi.unstubAllGlobals();
+  return new Promise<void>((resolve) => server.close(() => resolve()));
+});
 
 it("asks for the subprotocol, sends no Origin, keeps path and query, and begins with CreateConnection", async () => {
   const first = new Promise<Buffer>((resolve) => {
@@ -69,11 +96,7 @@ it("uses Node's own WebSocket where there is one, with the same headers", async 
     }
   }
   vi.stubGlobal("WebSocket", Native);
-  try {
-    expect((await failure(connect(url, { token: "rrg_secret" }))).message).toContain("not today");
-  } finally {
-    vi.unstubAllGlobals();
-  }
+  expect((await failure(connect(url, { token: "rrg_secret" }))).message).toContain("not today");
   const protocols = ["robotraconteur.robotraconteur.com"];
   expect(made).toEqual([[url, { protocols, headers: { ["Authorization"]: "Bearer rrg_secret" } }]]);
 });
@@ -112,15 +135,17 @@ it("says where it could not connect to", async () => {
   server = new WebSocketServer({ host: "127.0.0.1", port: 0 });
 });
 
-it("refuses text frames", async () => {
-  const closed = new Promise<number>((resolve) => {
+it("refuses text frames, and says so", async () => {
+  const closed = new Promise((resolve) => {
     greet = (socket) => {
       socket.on("close", resolve);
       socket.send("hello");
     };
   });
-  await failure(connect(url));
-  expect(await closed).toBe(1003);
+  const error = await failure(connect(url));
+  expect(error.code).toBe(ErrorCode.ConnectionError);
+  expect(error.message).toMatch(/devices\/create was closed: found a text frame, expected binary ones$/);
+  await closed;
 });
 
 it("lets go of the socket when connecting is given up", async () => {

@@ -18,6 +18,7 @@ const inPage = page && `nobody answers there, or does not let pages of ${page} i
 export async function openWebsocket(url: URL, listener: TransportListener, proof: Proof = {}): Promise<Transport> {
   const WebSocketClass = await platform.findWebsocket(url, proof);
   const where = `${url.protocol}//${url.host}${url.pathname}`;
+  const closed = `the connection to ${where} was closed`;
   const refused = `could not connect to ${where}`;
   let socket: WebSocket;
   try {
@@ -44,7 +45,10 @@ export async function openWebsocket(url: URL, listener: TransportListener, proof
   socket.addEventListener("message", (event: MessageEvent) => {
     if (isTold) return;
     if (event.data instanceof ArrayBuffer) listener.received(new Uint8Array(event.data));
-    else socket.close(1003, "expected binary frames");
+    else {
+      socket.close(); // 1003, which says why, is not for those who use a WebSocket
+      tellClosed(`${closed}: found a text frame, expected binary ones`);
+    }
   });
   // Browsers do not say what went wrong; other engines may.
   socket.addEventListener("error", (event: Event) => {
@@ -52,7 +56,7 @@ export async function openWebsocket(url: URL, listener: TransportListener, proof
   });
   socket.addEventListener("close", (event: CloseEvent) => {
     const why = event.reason || failure || (isOpen ? `WebSocket code ${event.code}` : inPage);
-    const what = isOpen ? `the connection to ${where} was closed` : refused;
+    const what = isOpen ? closed : refused;
     tellClosed(why ? `${what}: ${why}` : what);
   });
   return {
