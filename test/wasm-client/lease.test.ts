@@ -1,6 +1,6 @@
 // Leases at a service that knows none, and calls that are sent past what waits. With a gateway: test/e2e/tests/lease.spec.ts.
 import { readdirSync, readFileSync } from "node:fs";
-import { Info } from "../../wasm-client/dist/internal.js";
+import { Core, Info } from "../../wasm-client/dist/internal.js";
 import { ErrorCode, lease, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
@@ -16,9 +16,10 @@ object Root
   function int32{generator} count(int32 last)
 end`;
 
+let service: TestService;
 let robot: RemoteObject;
 beforeEach(async () => {
-  const service = await TestService.start({ definitions: [definition], root: "test.lease.Root" });
+  service = await TestService.start({ definitions: [definition], root: "test.lease.Root" });
   robot = await service.connect();
 });
 afterEach(async () => {
@@ -159,6 +160,65 @@ describe("a lease", () => {
     timeouts.length = 0;
     await robot["speed"]!.set(1);
     expect(timeouts).toEqual([undefined]);
+  });
+});
+
+describe("a lease that is given up while it is asked for", () => {
+  const [acquire, release] = [0, 3];
+  let commands: () => unknown[];
+  beforeEach(() => {
+    const asked = vi.spyOn(Core.prototype, "lease");
+    commands = () => asked.mock.calls.map(([, command]) => command);
+    service.isMute = true;
+  });
+  afterEach(() => {
+    vi.restoreAllMocks();
+    service.isMute = false;
+  });
+
+  /** Asks for it and gives it up, after `meanwhile`. */
+  const giveUp = async (meanwhile: () => void = () => undefined) => {
+    const abort = new AbortController();
+    const asking = failure(lease(robot, { signal: abort.signal }));
+    await settle();
+    meanwhile();
+    await settle();
+    abort.abort(new Error("enough"));
+    expect((await asking).message).toBe("enough");
+    await settle();
+  };
+
+  it("is given back: the gateway may grant it yet", async () => {
+    await giveUp();
+    expect(commands()).toEqual([acquire, release]);
+    expect((await failure(lease(robot, { timeout: 5 }))).code).toBe(ErrorCode.RequestTimeout);
+    await settle();
+    expect(commands()).toEqual([acquire, release, acquire, release]);
+  });
+
+  it("stays where it is held, or asked for again", async () => {
+    const stop = gateway(() => Promise.resolve(null));
+    const held = await lease(robot, { deadman: 60_000 });
+    stop();
+    await giveUp();
+    expect(commands()).toEqual([acquire]);
+    void held.release().catch(() => undefined);
+    await settle();
+    let again: Promise<unknown> | undefined;
+    await giveUp(() => void (again = failure(lease(robot, { timeout: 100 }))));
+    expect(commands()).toEqual([acquire, release, acquire, acquire]);
+    await again;
+    await settle();
+    expect(commands().slice(4)).toEqual([release]);
+  });
+
+  it("is not given back where the gateway was not asked, or refuses", async () => {
+    const signal = AbortSignal.abort(new Error("enough"));
+    expect((await failure(lease(robot, { signal }))).message).toBe("enough");
+    service.isMute = false;
+    expect((await failure(lease(robot))).code).toBe(ErrorCode.NotImplementedError);
+    await settle();
+    expect(commands()).toEqual([acquire]);
   });
 });
 

@@ -23,9 +23,20 @@ export async function lease(object: { readonly $: ObjectInfo }, options: LeaseOp
   const ask = (command: number, more: CallOptions = {}) =>
     session.request((core) => core.lease(path, command, deadman), more);
   const askedAt = performance.now();
+  const { signal } = options;
+  const wasAborted = signal?.aborted;
+  const asked = asking.get(session) ?? [];
+  asking.set(session, asked);
+  asked.push(path);
   try {
-    await ask(options.takeover ? Command.takeOver : Command.acquire, options);
+    const asks = ask(options.takeover ? Command.takeOver : Command.acquire, options);
+    await asks.finally(() => asked.splice(asked.indexOf(path), 1));
   } catch (error) {
+    const isLate = error instanceof RobotRaconteurError && error.code === ErrorCode.RequestTimeout;
+    const isGivenUp = isLate || (signal?.aborted && !wasAborted);
+    // The gateway may grant it yet, and nobody would renew it.
+    if (isGivenUp && !asked.includes(path) && !limits.get(session)?.has(path))
+      void ask(Command.release).catch(() => undefined);
     throw explain(error);
   }
   const held = new HeldLease(ask, deadman, askedAt);
@@ -36,6 +47,9 @@ export async function lease(object: { readonly $: ObjectInfo }, options: LeaseOp
   return held;
 }
 
+/** The objects whose leases are asked for, once for each call. */
+const asking = new WeakMap<Session, string[]>();
+/** The objects whose leases are held. */
 const limits = new WeakMap<Session, Map<string, number>>();
 
 /** Commands of the object and of those below it have so much time, until the returned function is called. */
