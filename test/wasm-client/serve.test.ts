@@ -2,6 +2,7 @@
 import { readFileSync } from "node:fs";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import { serve, type ServedDevice, type ServeOptions } from "../../wasm-client/dist/serve/node.js";
+import { ServedEndpoint, ServedPipe } from "../../wasm-client/ts/serve/served_object.js";
 import { FakeGateway, type PageSocket } from "./fake_gateway.js";
 
 const definition = `
@@ -187,6 +188,21 @@ it("lets a sender of packets wait for the slowest client, and not for one that g
   socket!.end(1006, "");
   await sending;
   expect(pipe.endpoints.size).toBe(0);
+});
+
+it.each([
+  ["64 MiB", 1024 * 1024, 64],
+  ["10,000", 1, 10_000],
+])("keeps the newest packets of a client, %s at most", async (_, size, count) => {
+  const endpoint = new ServedEndpoint({ closePipe: () => undefined } as never, new ServedPipe(), 1, 1, 0);
+  const packets = Array.from({ length: count + 3 }, () => new Uint8Array(size));
+  for (const packet of packets) endpoint.take(packet);
+  endpoint.take(new Uint8Array(2 * size)); // for two of 1 MiB
+  endpoint.close();
+  const left: unknown[] = [];
+  for await (const packet of endpoint) left.push(packet);
+  const first = packets.indexOf(left[0] as Uint8Array<ArrayBuffer>);
+  expect([first, left.length]).toEqual(size > 1 ? [5, count - 1] : [4, count]);
 });
 
 it("answers calls back and gives events to all", async () => {

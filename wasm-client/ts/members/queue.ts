@@ -12,7 +12,7 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
 
   /**
    * @param onReturn    the consumer left its loop.
-   * @param onOverflow  what to fail with where a value is too much; without it the oldest goes.
+   * @param onOverflow  what to fail with where a value is too much; without it the oldest go.
    * @param maxBytes    about as much memory may wait.
    */
   constructor(
@@ -30,9 +30,10 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
       return;
     }
     const size = this.maxBytes === Infinity ? 0 : roughSize(value);
-    const isFull = this.#values.length >= this.limit || (this.#bytes > 0 && this.#bytes + size > this.maxBytes);
-    if (isFull && this.onOverflow) return this.fail(this.onOverflow());
-    if (isFull) this.#values.shift();
+    while (this.#values.length >= this.limit || (this.#bytes > 0 && this.#bytes + size > this.maxBytes)) {
+      if (this.onOverflow) return this.fail(this.onOverflow());
+      this.#shift();
+    }
     this.#bytes += size;
     this.#values.push(value);
   }
@@ -48,11 +49,7 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   }
 
   next(): Promise<IteratorResult<T, undefined>> {
-    if (this.#values.length > 0) {
-      const value = this.#values.shift() as T;
-      if (this.maxBytes !== Infinity) this.#bytes -= roughSize(value);
-      return Promise.resolve({ done: false, value });
-    }
+    if (this.#values.length > 0) return Promise.resolve({ done: false, value: this.#shift() });
     if (!this.#end) return new Promise((resolve, reject) => this.#waiting.push({ resolve, reject }));
     const end = this.#end;
     this.#end = {};
@@ -64,6 +61,12 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
     this.#finish({});
     this.onReturn();
     return Promise.resolve({ done: true, value: undefined });
+  }
+
+  #shift(): T {
+    const value = this.#values.shift() as T;
+    if (this.maxBytes !== Infinity) this.#bytes -= roughSize(value);
+    return value;
   }
 
   #finish(end: { error?: unknown }): void {

@@ -1,8 +1,11 @@
 // An object of a page that is a device: what its author gave, and the members that are his to drive. Layer:
 // wasm-client/ts.
 import { makeError } from "../errors.js";
-import { ValueQueue } from "../members/queue.js";
+import { queueLimits, ValueQueue } from "../members/queue.js";
 import type { MemberInfo, RrValue } from "../types.js";
+
+/** What may wait of an endpoint's packets. */
+const { limit, maxBytes } = queueLimits;
 
 /** What an object asks of the service that it belongs to. */
 export interface ServiceOfObject {
@@ -94,7 +97,7 @@ export class ServedEndpoint implements AsyncIterable<RrValue> {
     readonly id: number,
     readonly index: number,
   ) {
-    this.#received = new ValueQueue(maxPackets, () => this.close());
+    this.#received = new ValueQueue(limit, () => this.close(), undefined, maxBytes);
   }
 
   get isClosed(): boolean {
@@ -111,7 +114,7 @@ export class ServedEndpoint implements AsyncIterable<RrValue> {
     this.closed();
   }
 
-  /** Packets of the client, until it closes the endpoint or goes. Of more than 10,000 that wait, the oldest are lost. */
+  /** Packets of the client, until it closes the endpoint or goes. Of more than 10,000 or 64 MiB that wait, the oldest are lost. */
   [Symbol.asyncIterator](): AsyncIterator<RrValue, undefined> {
     return this.#received;
   }
@@ -132,8 +135,6 @@ export class ServedEndpoint implements AsyncIterable<RrValue> {
     if (!this.#isClosed) throw error;
   }
 }
-
-const maxPackets = 10_000;
 
 /** A client, as long as a member answers it. */
 export class Caller {
