@@ -228,6 +228,47 @@ it("gives none of the packets that came together with those that were too many",
   expect(page.events.filter(({ kind }) => kind === "pipe_closed")).toHaveLength(1);
 });
 
+it("disconnects a pipe that was given up when its answer was on its way, and not one whose answer was taken", async () => {
+  /** Connects, gives it up, and lets the service send to each endpoint. @returns how many have got it. */
+  const connectAndCancel = async (isTaken: boolean): Promise<number> => {
+    page.take();
+    await page.isQuiet();
+    const before = valuesOf(page, "pipe").length;
+    const id = page.ask("connectPipe", "numbers", -1, {});
+    await page.event(completed(id));
+    if (isTaken) page.take();
+    page.say({ kind: "cancel", id });
+    page.ask("callFunction", "stream_numbers", [4, 1]);
+    await page.takeUntil(completed(page.ask("getProperty", "speed")));
+    return valuesOf(page, "pipe").length - before;
+  };
+  expect(await connectAndCancel(true)).toBe(1);
+  expect(await connectAndCancel(false)).toBe(1); // the first one's
+});
+
+it("unlocks what was given up when its answer was on its way", async () => {
+  const service = await TestService.start({ definitions: [definition], root: "test.host.Root", requireUser: false });
+  page.say({ kind: "close" });
+  page = new Page(proofOf(service.transport));
+  await page.until(({ kind }) => kind === "opened");
+  page.begin();
+  await page.event(({ kind }) => kind === "connected");
+  await page.takeUntil(completed(page.call("authenticate", ["alice", { password: "secret" }], true)));
+  const lock = (kind: string) => page.call("lock", ["test", kind], true);
+  const isFree = async () => {
+    const id = lock("client");
+    const { kind } = await page.takeUntil((event) => "id" in event && event.id === id);
+    if (kind === "completed") await page.takeUntil(completed(page.call("unlock", ["test"], true)));
+    return kind === "completed";
+  };
+  page.take();
+  await page.isQuiet();
+  const given = lock("user");
+  await page.event(completed(given));
+  page.say({ kind: "cancel", id: given });
+  expect(await isFree()).toBe(true);
+});
+
 it("counts the bytes of packets, too", async () => {
   await page.takeUntil(completed(page.ask("connectPipe", "pictures", -1, { maxBytes: 100_000 })));
   await page.isQuiet();

@@ -37,6 +37,10 @@ export class Host {
   /** Requests by the number of the core, and its numbers by those of the page. */
   readonly #requests = new Map<number, CallMessage>();
   readonly #numbers = new Map<number, number>();
+  /** Pipes and locks that the page asked for and may give up yet, as it has not taken the answer, by its numbers. */
+  readonly #untaken = new Map<number, { call: CallMessage; value: unknown }>();
+  /** Those whose answer the page is told. */
+  #toldAnswers: number[] = [];
   /** Limits of endpoints by line. */
   readonly #limits = new Map<string, { limit: number; maxBytes: number }>();
   /** Lines of endpoints that were closed here: what still comes is nobody's. */
@@ -90,6 +94,7 @@ export class Host {
         break;
       case "taken":
         this.#isTelling = false;
+        for (const id of this.#toldAnswers.splice(0)) this.#untaken.delete(id);
         this.#tell();
         break;
       case "close":
@@ -163,11 +168,20 @@ export class Host {
 
   #cancel(id: number): void {
     const number = this.#numbers.get(id);
-    if (number === undefined) return;
     this.#numbers.delete(id);
-    this.#requests.delete(number);
-    this.#guarded((core) => core.cancel(number));
+    if (number !== undefined) this.#requests.delete(number);
+    this.#guarded((core) => (number === undefined ? this.#undo(core, id) : core.cancel(number)));
     this.#pump();
+  }
+
+  /** What the page gave up while the answer was on its way lasts no longer. */
+  #undo(core: Core, id: number): void {
+    const { call, value } = this.#untaken.get(id) ?? {};
+    if (!call) return;
+    this.#untaken.delete(id);
+    const [path, member] = call.args as [string, string];
+    if (call.method === "lock") core.unlock(path);
+    else core.disconnectPipe(path, member, Number(value));
   }
 
   // --- the pump ---
@@ -262,6 +276,7 @@ export class Host {
     this.#numbers.delete(call.id);
     const own = { ...event, id: call.id };
     if (own.kind === "failed") return void this.#outbox.push({ ...own, seen: { wantsClose: core.wantsClose() } });
+    if (call.method === "connectPipe" || call.method === "lock") this.#untaken.set(call.id, { call, value: own.value });
     const [path, member, , limits] = call.args as [string, string, number, { limit?: number; maxBytes?: number }];
     switch (call.method) {
       case "findObject":
@@ -312,6 +327,7 @@ export class Host {
     if (!core || this.#isTelling || (this.#outbox.isEmpty && !this.#hasRoomAgain(core))) return;
     this.#isTelling = true;
     const { events, cargo } = this.#outbox.take();
+    this.#toldAnswers = events.flatMap((event) => (event.kind === "completed" ? [event.id] : []));
     this.#told = { queued: this.#queued(core), taken: this.#taken };
     if (!this.#isOver) this.#stats = core.stats();
     const news = { kind: "news", events, stats: this.#stats, ...this.#told, marks: cargo.marks } as const;
