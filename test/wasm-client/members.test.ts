@@ -239,6 +239,7 @@ describe("events", () => {
     const ends = [failure(loop), failure(touched.once())];
     await settle();
     await m("release")("test.head");
+    ends.push(failure(touched.once()), failure(touched[Symbol.asyncIterator]().next())); // there is none any more
     for (const { message } of await Promise.all(ends))
       expect(message).toBe('the service released object "test.head": look it up again');
   });
@@ -480,6 +481,30 @@ it("hears what became of the values of a wire and of a pipe", async () => {
   await robot.$.close();
   expect((await failure(end.losses())).code).toBe(ErrorCode.ConnectionError);
 });
+
+it.each([Infinity, 2 ** 31])(
+  "waits %s ms where it is told to: longer than timers of the engine can",
+  async (timeout) => {
+    const endpoint = await m("stream").connect(-1);
+    service.isMute = true;
+    vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+    const settled: string[] = [];
+    const waits = {
+      event: m("bump").once({ timeout }),
+      wire: m("both").connect({ timeout }).ready,
+      acknowledgement: endpoint.send(1, { ack: true, timeout }),
+      answer: m("add")(1, 2, { timeout }),
+    };
+    for (const [name, wait] of Object.entries(waits)) {
+      const over = () => settled.push(name);
+      void (wait as Promise<unknown>).then(over, over);
+    }
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(settled).toEqual([]);
+    vi.useRealTimers();
+    service.isMute = false;
+  },
+);
 
 it("uses the root object as the type that was asked for", async () => {
   const other = await TestService.start({ definitions: [definition], root: "test.members.Root" });

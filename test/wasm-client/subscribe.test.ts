@@ -271,6 +271,18 @@ it("gives the client within limits", async () => {
   await subscription.close();
 });
 
+it("gives the client as late as it is told to: later than timers of the engine can", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+  const transport: OpenTransport = () => new Promise(() => undefined);
+  const subscription = subscribe(url, { transport });
+  let isOver = false;
+  void failure(subscription.client({ timeout: Infinity })).then(() => (isOver = true));
+  await vi.advanceTimersByTimeAsync(1000);
+  expect(isOver).toBe(false);
+  vi.useRealTimers();
+  await subscription.close();
+});
+
 it("keeps a wire over connections", async () => {
   const first = await start();
   const second = await start();

@@ -1,4 +1,5 @@
 // Time and chance as subscriptions see them; tests bring their own. Layer: wasm-client/ts.
+import { after } from "./within.js";
 
 export interface Clock {
   /** Calls `due` once, after so many milliseconds. @returns a function that takes it back. */
@@ -7,7 +8,7 @@ export interface Clock {
 
 export const systemClock: Clock = {
   after(milliseconds, due) {
-    const timer = setTimeout(due, milliseconds);
+    const timer = after(milliseconds, due);
     return () => clearTimeout(timer);
   },
 };

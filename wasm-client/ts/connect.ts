@@ -10,7 +10,7 @@ import { openUsb } from "./usb_devices.js";
 import { Core, preload } from "./wasm_module.js";
 import type { KnownDefinitions } from "./wasm_module.js";
 import { openWebsocket } from "./websocket.js";
-import { checkSignal } from "./within.js";
+import { after, checkSignal } from "./within.js";
 
 /** Asked for the URL at each attempt, so that each can have a ticket of its own. */
 export type UrlSource = () => string | URL | Promise<string | URL>;
@@ -90,9 +90,8 @@ export async function connectWith<T>(
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
   let where = "the function that gives the URL";
-  const timer = setTimeout(
-    () => attempt.fail(makeError("RequestTimeout", `${where}: no session within ${timeout} ms`)),
-    Math.min(timeout, 2 ** 31 - 1),
+  const timer = after(timeout, () =>
+    attempt.fail(makeError("RequestTimeout", `${where}: no session within ${timeout} ms`)),
   );
   try {
     const given = typeof url === "function" ? await attempt.unlessFailed(Promise.resolve().then(url)) : url;

@@ -122,7 +122,13 @@ export class ObjectTree {
     const members = (session.look((core) => core.members(path)) ?? []).map(freezeInfo);
     const handles = new Map<string, DynamicMember>();
     for (const info of members) {
-      const context: MemberContext = { session, path, info, findObject: (child, options) => this.find(child, options) };
+      const context: MemberContext = {
+        session,
+        path,
+        info,
+        isReleased: () => !this.#objects.get(path)?.object,
+        findObject: (child, options) => this.find(child, options),
+      };
       handles.set(info.name, faces[info.kind](context) as DynamicMember);
     }
     // No prototype: what is not a member of the service is not there at all.

@@ -1,14 +1,15 @@
 // Events: listeners, the next one, or a loop over all. Layer: wasm-client/ts/members. Source: sessions spec section 2.9.
 import { makeError } from "../errors.js";
+import { releasedObject } from "../session.js";
 import type { EventMember, RrValue } from "../types.js";
-import { checkSignal } from "../within.js";
+import { after, checkSignal } from "../within.js";
 import type { MemberContext } from "./member.js";
 import { queueLimits, ValueQueue } from "./queue.js";
 
 /** What a loop may be behind. Events are never dropped silently: a loop that is slower ends with an error. */
 const { limit, maxBytes } = queueLimits;
 
-export function makeEvent({ session, path, info }: MemberContext): EventMember {
+export function makeEvent({ session, path, info, isReleased }: MemberContext): EventMember {
   const listen = (onEvent: (args: RrValue[]) => void) => session.listen(path, info.name, { onEvent });
   return Object.freeze({
     on: (listener: (...args: RrValue[]) => void) => {
@@ -20,6 +21,7 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
       new Promise((resolve, reject) => {
         checkSignal(signal);
         if (signal?.aborted) return reject(signal.reason);
+        if (isReleased()) return reject(releasedObject(path));
         const end = () => {
           stopListening();
           stopClosing();
@@ -30,13 +32,9 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
         const abort = () => fail(signal?.reason);
         const stopListening = listen((args) => (end(), resolve(args)));
         const stopClosing = session.onEnd(path, (reason) => fail(reason ?? closedHere()));
-        const timer =
-          timeout === undefined
-            ? undefined
-            : setTimeout(
-                () => fail(makeError("RequestTimeout", `no event ${info.name} within ${timeout} ms`)),
-                timeout,
-              );
+        const timer = after(timeout, () =>
+          fail(makeError("RequestTimeout", `no event ${info.name} within ${timeout} ms`)),
+        );
         signal?.addEventListener("abort", abort, { once: true });
       }),
 
@@ -53,6 +51,10 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
       const queue = new ValueQueue<RrValue[]>(limit, end, overflow, maxBytes);
       const stopListening = listen((args) => queue.push(args));
       const stopClosing = session.onEnd(path, (reason) => (reason ? queue.fail(reason) : queue.end()));
+      if (isReleased()) {
+        end();
+        queue.fail(releasedObject(path));
+      }
       return queue;
     },
   } satisfies EventMember);

@@ -9,6 +9,8 @@ export interface MemberContext {
   readonly session: Session;
   readonly path: string;
   readonly info: MemberInfo;
+  /** Whether the service has replaced the object, and nobody has looked it up again. */
+  isReleased(): boolean;
   /** The object that a path leads to; concurrent look-ups share one. */
   findObject(path: string, options?: CallOptions): Promise<RemoteObject>;
 }

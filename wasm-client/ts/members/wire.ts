@@ -2,7 +2,7 @@
 import { asyncDispose } from "../dispose.js";
 import { makeError } from "../errors.js";
 import type { CallOptions, Losses, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
-import { checkSignal } from "../within.js";
+import { after, checkSignal } from "../within.js";
 import { lossesOf } from "./member.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
@@ -196,13 +196,10 @@ class Connection implements WireConnection {
         void this.wire.leave(this);
       };
       const abort = () => giveUp(signal?.reason);
-      const timer =
-        timeout === undefined
-          ? undefined
-          : setTimeout(() => {
-              const name = this.wire.context.info.name;
-              giveUp(makeError("RequestTimeout", `wire ${name} was not connected within ${timeout} ms`));
-            }, timeout);
+      const timer = after(timeout, () => {
+        const name = this.wire.context.info.name;
+        giveUp(makeError("RequestTimeout", `wire ${name} was not connected within ${timeout} ms`));
+      });
       this.#abort = () => {
         clearTimeout(timer);
         signal?.removeEventListener("abort", abort);

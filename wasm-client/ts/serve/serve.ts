@@ -9,6 +9,7 @@ import type { Proof } from "../platform.js";
 import type { Transport } from "../transport.js";
 import { parseServiceUrl } from "../url.js";
 import { openWebsocket } from "../websocket.js";
+import { after } from "../within.js";
 import type { Caller, Implementation, ServedObject } from "./served_object.js";
 import { Service } from "./service.js";
 
@@ -158,10 +159,7 @@ class Device implements ServedDevice {
         reject(error);
         socket.close();
       };
-      const timer = setTimeout(
-        () => fail(makeError("RequestTimeout", `${where}: no answer within ${timeout} ms`)),
-        Math.min(timeout, 2 ** 31 - 1),
-      );
+      const timer = after(timeout, () => fail(makeError("RequestTimeout", `${where}: no answer within ${timeout} ms`)));
       const abort = () => fail(signal?.reason);
       signal?.addEventListener("abort", abort, { once: true });
       const settled = () => {
