@@ -167,6 +167,34 @@ it("asks nothing of a core that has failed, and connects again", async () => {
   await subscription.close();
 });
 
+it("ends a session whose core fails in a request or a packet, and connects again", async () => {
+  const subscription = follow(inTurn(await start(), await start(), await start()));
+  const broken = new WebAssembly.RuntimeError("unreachable");
+  const deep = new RangeError("Maximum call stack size exceeded");
+  const fail = (method: "callFunction" | "sendWire", error: Error) =>
+    vi.spyOn(Core.prototype, method).mockImplementationOnce(() => {
+      throw error;
+    });
+  const asked = vi.spyOn(Core.prototype, "knownDefinitions");
+  const lost: string[] = [];
+  subscription.onLost(({ message }) => lost.push(message));
+
+  fail("callFunction", broken);
+  const calling = await failure((await subscription.client())["twice"]!(1));
+  expect([calling.code, calling.message]).toEqual([ErrorCode.InternalError, "the session failed: unreachable"]);
+  clock.fire();
+  const wire = (await subscription.client())["both"]!.connect();
+  await wire.ready;
+  fail("sendWire", deep);
+  expect((await failure(wire.send(1))).message).toBe("the session failed: Maximum call stack size exceeded");
+  clock.fire();
+  expect(await (await subscription.client())["twice"]!(2)).toBe(2);
+  expect(lost).toEqual([broken, deep].map(({ message }) => `the session failed: ${message}`));
+  expect(asked).not.toHaveBeenCalled();
+  vi.restoreAllMocks();
+  await subscription.close();
+});
+
 it("waits longer after each failure, up to a limit, and starts again after a success", async () => {
   const chances = [0, 0.999];
   let turn = 0;

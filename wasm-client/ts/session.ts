@@ -113,11 +113,13 @@ export class Session {
       checkSignal(signal);
       if (signal?.aborted) return reject(signal.reason);
       if (this.#end) return reject(this.#end.reason);
-      this.core.prepareRequest(checkTimeout(options.timeout ?? this.timeout), this.#isUrgent);
-      const id = ask(this.core);
+      const id = this.#told((core) => {
+        core.prepareRequest(checkTimeout(options.timeout ?? this.timeout), this.#isUrgent);
+        return ask(core);
+      });
       const abort = () => {
         this.#pending.delete(id);
-        if (!this.#isClosed) this.core.cancel(id);
+        if (!this.#isClosed) this.#guarded(() => this.core.cancel(id));
         reject(signal?.reason);
       };
       const forget = () => signal?.removeEventListener("abort", abort);
@@ -149,7 +151,7 @@ export class Session {
   tell<T>(what: (core: Core) => T): T {
     if (this.#end) throw this.#end.reason;
     try {
-      return what(this.core);
+      return this.#told(what);
     } finally {
       this.#pump(); // also where it failed: the service may be told so
     }
@@ -384,14 +386,30 @@ export class Session {
     for (const listener of [...listeners]) callSafely(() => what(listener));
   }
 
+  /** As #guarded(), where a value may also not fit. @throws RobotRaconteurError */
+  #told<T>(what: (core: Core) => T): T {
+    try {
+      return what(this.core);
+    } catch (error) {
+      if (!(error instanceof WebAssembly.RuntimeError || error instanceof RangeError)) throw error;
+      throw this.#break(error);
+    }
+  }
+
   /** An exception here is a trap in the core (memory at its end) or a broken transport: the session is over. */
   #guarded(what: () => void): void {
     try {
       what();
     } catch (error) {
-      this.#isBroken = true;
-      this.#finish(makeError("InternalError", `the session failed: ${textOf(error)}`));
+      this.#break(error);
     }
+  }
+
+  #break(error: unknown): RobotRaconteurError {
+    const reason = makeError("InternalError", `the session failed: ${textOf(error)}`);
+    this.#isBroken = true;
+    this.#finish(reason);
+    return reason;
   }
 }
 
