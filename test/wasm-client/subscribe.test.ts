@@ -445,6 +445,39 @@ it("ends a loop over a pipe that is too far behind", async () => {
   await subscription.close();
 });
 
+it("ends a loop over a pipe whose endpoint was closed because more came at once; the next one goes on", async () => {
+  const subscription = follow(inTurn(await start()));
+  const connected = vi.spyOn(Core.prototype, "connectPipe");
+  const pipe = subscription.pipe<any>("echo", { limit: 10, maxBytes: 1_000_000 });
+  const failed: unknown[] = [];
+  pipe.onFailed((error) => failed.push((error as RobotRaconteurError).code));
+  const seen: unknown[] = [];
+  const take = async () => {
+    for await (const packet of pipe) seen.push(packet);
+  };
+  const loop = failure(take());
+  const client = await subscription.client();
+  await vi.waitUntil(() => pipe.isConnected);
+  expect(connected.mock.calls.map(([, , , limits]) => limits)).toEqual([{ limit: 10, maxBytes: 1_000_000 }]);
+  connected.mockRestore();
+  await client["stream_echo"]!(1, 400);
+  const error = await loop;
+  expect(error.code).toBe(ErrorCode.OutOfSystemResource);
+  expect(error.message).toContain("more than 10 packets");
+  expect(seen.length).toBeLessThan(400);
+  expect(failed).toEqual([ErrorCode.OutOfSystemResource]);
+
+  seen.length = 0;
+  void take();
+  await vi.waitUntil(() => clock.waits.length > 0);
+  clock.fire();
+  await vi.waitUntil(() => pipe.isConnected);
+  await client["stream_echo"]!(2, 3);
+  await settle();
+  expect(seen).toEqual([2, 2, 2]);
+  await subscription.close();
+});
+
 it("ends a loop over a pipe or an event whose values are too large to wait", async () => {
   const subscription = follow(inTurn(await start()));
   const pipe = subscription.pipe("blocks", { maxBytes: 10_000 });

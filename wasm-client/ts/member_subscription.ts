@@ -1,7 +1,8 @@
 // Wires and pipes that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
 import type { Clock } from "./clock.js";
 import { asyncDispose } from "./dispose.js";
-import { callSafely, makeError } from "./errors.js";
+import { callSafely, ErrorCode, makeError } from "./errors.js";
+import type { RobotRaconteurError } from "./errors.js";
 import { queueLimits, ValueQueue } from "./members/queue.js";
 import { ValueStore } from "./store.js";
 import type { Store } from "./store.js";
@@ -121,6 +122,12 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
       throw makeError("InvalidOperation", `${this.member}: the service closed the connection of this member`);
     } catch (error) {
       if (this.#closed) return;
+      // More came at once than this side keeps, and is lost: whoever takes it has to know.
+      const isFull = (error as RobotRaconteurError).code === ErrorCode.OutOfSystemResource;
+      if (isFull && connection && client.$.state === "connected") {
+        for (const loop of this.#loops) loop.fail(error);
+        this.#loops.clear();
+      }
       for (const failed of [...this.#failed]) callSafely(() => failed(error));
     } finally {
       if (connection && this.connection === connection) this.connection = undefined;
@@ -207,7 +214,8 @@ export class PipeSubscription<T = RrValue> extends StreamSubscription<PipeEndpoi
   }
 
   protected async connect(object: RemoteObject): Promise<PipeEndpoint<T, unknown>> {
-    return (await object.$.member(this.member).connect(-1)) as PipeEndpoint<T, unknown>;
+    const { limit, maxBytes } = this.#options;
+    return (await object.$.member(this.member).connect(-1, { limit, maxBytes })) as PipeEndpoint<T, unknown>;
   }
 
   protected async follow(endpoint: PipeEndpoint<T, unknown>): Promise<void> {
