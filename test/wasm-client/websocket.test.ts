@@ -144,7 +144,7 @@ it("refuses text frames, and says so", async () => {
   });
   const error = await failure(connect(url));
   expect(error.code).toBe(ErrorCode.ConnectionError);
-  expect(error.message).toMatch(/devices\/create was closed: found a text frame, expected binary ones$/);
+  expect(error.message).toMatch(/devices\/create was closed: found text, expected binary frames$/);
   await closed;
 });
 

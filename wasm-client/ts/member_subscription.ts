@@ -44,11 +44,12 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
   #stopWaiting: (() => void) | undefined;
   #closed: Promise<void> | undefined;
 
+  /** Use the methods of Subscription. */
   constructor(
     subscription: Subscription<unknown>,
     private readonly clock: Clock,
     protected readonly member: string,
-    private readonly path: string,
+    protected readonly options: PipeSubscriptionOptions,
   ) {
     const attach = (client: unknown) => void this.#attach(client as RemoteObject);
     this.#stops = [subscription.onConnected(attach), subscription.onClosed(() => void this.close())];
@@ -91,11 +92,20 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
     return this.close();
   }
 
-  protected abstract makeQueue(onReturn: () => void): ValueQueue<V>;
   /** Connects the member of `object`. */
   protected abstract connect(object: RemoteObject): Promise<C>;
   /** Takes what comes until the connection ends. */
   protected abstract follow(connection: C): Promise<void>;
+
+  /** For a loop that ends with an error where more waits. */
+  protected makeQueue(onReturn: () => void): ValueQueue<V> {
+    const { limit = queueLimits.limit, maxBytes = queueLimits.maxBytes } = this.options;
+    const overflow = () => {
+      const found = `more than ${limit} values of ${this.member} or ${maxBytes} bytes of them wait`;
+      return makeError("OutOfSystemResource", `${found} and nobody takes them`);
+    };
+    return new ValueQueue<V>(limit, onReturn, overflow, maxBytes);
+  }
 
   protected receive(value: V): void {
     for (const loop of [...this.#loops]) loop.push(value);
@@ -113,8 +123,7 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
     this.#stopWaiting?.();
     let connection: C | undefined;
     try {
-      const object = this.path === "*" ? client : await client.$.find(this.path);
-      connection = await this.connect(object);
+      connection = await this.connect(await client.$.find(this.options.path ?? "*"));
       if (this.#closed) return void connection.close();
       this.connection = connection;
       for (const connected of [...this.#connected]) callSafely(connected);
@@ -159,11 +168,6 @@ export class WireSubscription<T = RrValue> extends StreamSubscription<WireConnec
   readonly #value = new ValueStore<T | undefined>(undefined);
   #time: WireTime | undefined;
 
-  /** Use Subscription.wire(). */
-  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: MemberSubscriptionOptions) {
-    super(subscription, clock, member, options.path ?? "*");
-  }
-
   /** The newest value; it stays while there is no connection. */
   get value(): T | undefined {
     return this.#value.getSnapshot();
@@ -178,7 +182,7 @@ export class WireSubscription<T = RrValue> extends StreamSubscription<WireConnec
     return this.#time;
   }
 
-  protected makeQueue(onReturn: () => void): ValueQueue<T> {
+  protected override makeQueue(onReturn: () => void): ValueQueue<T> {
     const queue = new ValueQueue<T>(1, onReturn);
     if (this.value !== undefined) queue.push(this.value);
     return queue;
@@ -201,21 +205,8 @@ export class WireSubscription<T = RrValue> extends StreamSubscription<WireConnec
 
 /** All packets of a pipe, in order for each connection. */
 export class PipeSubscription<T = RrValue> extends StreamSubscription<PipeEndpoint<T, unknown>, T> {
-  readonly #options: PipeSubscriptionOptions;
-
-  /** Use Subscription.pipe(). */
-  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
-    super(subscription, clock, member, options.path ?? "*");
-    this.#options = options;
-  }
-
-  protected makeQueue(onReturn: () => void): ValueQueue<T> {
-    return makeBounded(`packets of pipe ${this.member}`, this.#options, onReturn);
-  }
-
   protected async connect(object: RemoteObject): Promise<PipeEndpoint<T, unknown>> {
-    const { limit, maxBytes } = this.#options;
-    return (await object.$.member(this.member).connect(-1, { limit, maxBytes })) as PipeEndpoint<T, unknown>;
+    return (await object.$.member(this.member).connect(-1, this.options)) as PipeEndpoint<T, unknown>;
   }
 
   protected async follow(endpoint: PipeEndpoint<T, unknown>): Promise<void> {
@@ -229,18 +220,6 @@ interface Occurrences<A> extends Connection {
 
 /** The occurrences of an event, each as the array of its arguments. */
 export class EventSubscription<A extends unknown[] = RrValue[]> extends MemberSubscription<Occurrences<A>, A> {
-  readonly #options: PipeSubscriptionOptions;
-
-  /** Use Subscription.event(). */
-  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
-    super(subscription, clock, member, options.path ?? "*");
-    this.#options = options;
-  }
-
-  protected makeQueue(onReturn: () => void): ValueQueue<A> {
-    return makeBounded(`events ${this.member}`, this.#options, onReturn);
-  }
-
   protected connect(object: RemoteObject): Promise<Occurrences<A>> {
     const event = object.$.member(this.member) as Partial<AsyncIterable<A>>;
     const loop = event[Symbol.asyncIterator]?.();
@@ -251,17 +230,4 @@ export class EventSubscription<A extends unknown[] = RrValue[]> extends MemberSu
   protected async follow({ loop }: Occurrences<A>): Promise<void> {
     for (let step = await loop.next(); !step.done; step = await loop.next()) this.receive(step.value);
   }
-}
-
-/** For a loop that ends with an error where more waits. */
-function makeBounded<T>(
-  what: string,
-  { limit = queueLimits.limit, maxBytes = queueLimits.maxBytes }: PipeSubscriptionOptions,
-  onReturn: () => void,
-): ValueQueue<T> {
-  const overflow = () => {
-    const found = `more than ${limit} ${what} or ${maxBytes} bytes of them wait`;
-    return makeError("OutOfSystemResource", `${found} and nobody takes them`);
-  };
-  return new ValueQueue<T>(limit, onReturn, overflow, maxBytes);
 }

@@ -198,10 +198,14 @@ export class Session {
     return () => void this.#releaseListeners.delete(released);
   }
 
-  /** Calls once, when the session has ended or the service has replaced the object. */
-  onEnd(path: string, ended: (reason?: RobotRaconteurError) => void): () => void {
+  /**
+   * Calls once, when the session has ended or the service has replaced the object; soon, if that has happened already.
+   * @param isReleased  whether it has replaced it
+   */
+  onEnd(path: string, isReleased: boolean, ended: (reason?: RobotRaconteurError) => void): () => void {
     const stopClosing = this.onClose((reason) => end(reason));
-    const stopReleasing = this.onRelease((above) => isWithin(path, above) && end(releasedObject(path)));
+    const release = (above: string) => void (isWithin(path, above) && end(releasedObject(path)));
+    const stopReleasing = this.onRelease(release);
     const stop = () => {
       stopClosing();
       stopReleasing();
@@ -210,6 +214,7 @@ export class Session {
       stop();
       ended(reason);
     };
+    if (isReleased) queueMicrotask(() => this.#releaseListeners.has(release) && release(path));
     return stop;
   }
 
@@ -234,7 +239,7 @@ export class Session {
   /** Takes leave of the service; what waits for an answer rejects at once. */
   close(): Promise<void> {
     if (!this.#end) {
-      this.#end = { reason: makeError("ConnectionError", "the session was closed by this side"), isLocal: true };
+      this.#end = { reason: closedHere(), isLocal: true };
       this.#rejectPending(this.#end.reason);
       this.#guarded(() => this.core.disconnect());
       this.#pump();
@@ -427,3 +432,6 @@ export function isWithin(path: string, object: string): boolean {
 export function releasedObject(path: string): RobotRaconteurError {
   return makeError("ObjectNotFound", `the service released object "${path}": look it up again`);
 }
+
+export const closedHere = (): RobotRaconteurError =>
+  makeError("ConnectionError", "the session was closed by this side");

@@ -25,7 +25,7 @@ import type {
   WireLike,
 } from "./types.js";
 import { parseServiceUrl } from "./url.js";
-import { checkSignal } from "./within.js";
+import { checkSignal, within } from "./within.js";
 
 export interface SubscribeOptions extends ConnectOptions {
   /** Ends the subscription. */
@@ -129,27 +129,20 @@ export class Subscription<T = RemoteObject> {
    * The root object, as soon as there is a connection.
    * @throws RobotRaconteurError RequestTimeout, InvalidOperation (closed); the reason of `signal`.
    */
-  client(options: CallOptions = {}): Promise<Client<T>> {
-    const { signal, timeout } = options;
-    return new Promise((resolve, reject) => {
-      checkSignal(signal);
-      if (signal?.aborted) return reject(signal.reason);
+  client({ signal, timeout }: CallOptions = {}): Promise<Client<T>> {
+    const stops: (() => void)[] = [];
+    const client = new Promise<Client<T>>((resolve, reject) => {
       if (this.isClosed) return reject(closedError());
       if (this.#client) return resolve(this.#client);
-      const end = () => {
-        stops.forEach((stop) => stop());
-        signal?.removeEventListener("abort", abort);
-      };
-      const abort = () => (end(), reject(signal?.reason));
-      const stops = [
-        this.onConnected((client) => (end(), resolve(client))),
-        this.#on(this.#ended, () => (end(), reject(closedError()))),
-      ];
-      signal?.addEventListener("abort", abort, { once: true });
+      stops.push(
+        this.onConnected(resolve),
+        this.#on(this.#ended, () => reject(closedError())),
+      );
       if (timeout === undefined) return;
-      const late = () => (end(), reject(makeError("RequestTimeout", `no connection within ${timeout} ms`)));
+      const late = () => reject(makeError("RequestTimeout", `no connection within ${timeout} ms`));
       stops.push(this.#clock.after(timeout, late));
     });
+    return within(client, { signal }, "").finally(() => stops.forEach((stop) => stop()));
   }
 
   /** Calls `connected` with each new root object, also with the one that is there. @returns a function that ends it. */

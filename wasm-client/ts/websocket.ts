@@ -45,10 +45,7 @@ export async function openWebsocket(url: URL, listener: TransportListener, proof
   socket.addEventListener("message", (event: MessageEvent) => {
     if (isTold) return;
     if (event.data instanceof ArrayBuffer) listener.received(new Uint8Array(event.data));
-    else {
-      socket.close(); // 1003, which says why, is not for those who use a WebSocket
-      tellClosed(`${closed}: found a text frame, expected binary ones`);
-    }
+    else tellClosed(`${closed}: found text, expected binary frames`); // whose listener closes
   });
   // Browsers do not say what went wrong; other engines may.
   socket.addEventListener("error", (event: Event) => {

@@ -1,8 +1,9 @@
 // Events: listeners, the next one, or a loop over all. Layer: wasm-client/ts/members. Source: sessions spec section 2.9.
 import { makeError } from "../errors.js";
-import { releasedObject } from "../session.js";
+import type { RobotRaconteurError } from "../errors.js";
+import { closedHere } from "../session.js";
 import type { EventMember, RrValue } from "../types.js";
-import { after, checkSignal } from "../within.js";
+import { within } from "../within.js";
 import type { MemberContext } from "./member.js";
 import { queueLimits, ValueQueue } from "./queue.js";
 
@@ -11,32 +12,22 @@ const { limit, maxBytes } = queueLimits;
 
 export function makeEvent({ session, path, info, isReleased }: MemberContext): EventMember {
   const listen = (onEvent: (args: RrValue[]) => void) => session.listen(path, info.name, { onEvent });
+  const onEnd = (ended: (reason?: RobotRaconteurError) => void) => session.onEnd(path, isReleased(), ended);
   return Object.freeze({
     on: (listener: (...args: RrValue[]) => void) => {
       if (typeof listener === "function") return listen((args) => listener(...args));
       throw makeError("InvalidArgument", `${info.name}.on: found ${typeof listener}, expected a function`);
     },
 
-    once: ({ signal, timeout } = {}) =>
-      new Promise((resolve, reject) => {
-        checkSignal(signal);
-        if (signal?.aborted) return reject(signal.reason);
-        if (isReleased()) return reject(releasedObject(path));
-        const end = () => {
-          stopListening();
-          stopClosing();
-          clearTimeout(timer);
-          signal?.removeEventListener("abort", abort);
-        };
-        const fail = (reason: unknown) => (end(), reject(reason));
-        const abort = () => fail(signal?.reason);
-        const stopListening = listen((args) => (end(), resolve(args)));
-        const stopClosing = session.onEnd(path, (reason) => fail(reason ?? closedHere()));
-        const timer = after(timeout, () =>
-          fail(makeError("RequestTimeout", `no event ${info.name} within ${timeout} ms`)),
-        );
-        signal?.addEventListener("abort", abort, { once: true });
-      }),
+    once: (limits = {}) => {
+      let end!: () => void;
+      const next = new Promise<RrValue[]>((resolve, reject) => {
+        const stopListening = listen(resolve);
+        const stopClosing = onEnd((reason) => reject(reason ?? closedHere()));
+        end = () => (stopListening(), stopClosing(), resolve([])); // nobody waits for it any more
+      });
+      return within(next, limits, `no event ${info.name}`).finally(end);
+    },
 
     [Symbol.asyncIterator]: () => {
       const end = () => {
@@ -50,14 +41,8 @@ export function makeEvent({ session, path, info, isReleased }: MemberContext): E
       };
       const queue = new ValueQueue<RrValue[]>(limit, end, overflow, maxBytes);
       const stopListening = listen((args) => queue.push(args));
-      const stopClosing = session.onEnd(path, (reason) => (reason ? queue.fail(reason) : queue.end()));
-      if (isReleased()) {
-        end();
-        queue.fail(releasedObject(path));
-      }
+      const stopClosing = onEnd((reason) => (reason ? queue.fail(reason) : queue.end()));
       return queue;
     },
   } satisfies EventMember);
 }
-
-const closedHere = () => makeError("ConnectionError", "the session was closed by this side");
