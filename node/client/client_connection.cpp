@@ -10,6 +10,7 @@
 #include "core/session/service_path.hpp"
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
+#include "node/client/unread_reply.hpp"
 #include "node/values/exception.hpp"
 
 namespace rr {
@@ -391,6 +392,11 @@ void ClientConnection::handle(Completed&& completed) {
   auto found = completions_.extract(completed.id);
   if (!found) return;
   const auto done = spare_completion_.take(std::move(found));
+  if (completed.is_unread) {
+    auto error = completed.result.error();
+    error.sub_name = unread_reply;
+    completed.result = std::move(error);
+  }
   if (done) run_handler("request to", session_.service(), [&] { done(std::move(completed.result)); });
 }
 

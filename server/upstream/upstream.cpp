@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "core/session/client/unread_reply.hpp"
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
+#include "node/client/unread_reply.hpp"
 
 namespace rrgate {
 

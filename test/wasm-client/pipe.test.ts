@@ -198,7 +198,7 @@ it("closes with an error where the loop is too far behind", async () => {
   expect(await take(endpoint, 10)).toHaveLength(10);
   const error = await failure(take(endpoint, 1));
   expect(error.code).toBe(ErrorCode.OutOfSystemResource);
-  expect(error.message).toContain("more than 10 packets");
+  expect(error.message).toContain("more than 10 values");
 
   const heavy = await robot["blocks"]!.connect(-1, { maxBytes: 10_000 });
   await robot["stream_blocks"]!(new Float64Array(1000), 2);

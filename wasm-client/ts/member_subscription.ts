@@ -3,7 +3,7 @@ import type { Clock } from "./clock.js";
 import { asyncDispose } from "./dispose.js";
 import { callSafely, ErrorCode, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
-import { queueLimits, ValueQueue } from "./members/queue.js";
+import { overflowError, queueLimits, ValueQueue } from "./members/queue.js";
 import { ValueStore } from "./store.js";
 import type { Store } from "./store.js";
 import type { Subscription } from "./subscribe.js";
@@ -100,11 +100,7 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
   /** For a loop that ends with an error where more waits. */
   protected makeQueue(onReturn: () => void): ValueQueue<V> {
     const { limit = queueLimits.limit, maxBytes = queueLimits.maxBytes } = this.options;
-    const overflow = () => {
-      const found = `more than ${limit} values of ${this.member} or ${maxBytes} bytes of them wait`;
-      return makeError("OutOfSystemResource", `${found} and nobody takes them`);
-    };
-    return new ValueQueue<V>(limit, onReturn, overflow, maxBytes);
+    return new ValueQueue<V>(limit, onReturn, () => overflowError(this.member, limit, maxBytes), maxBytes);
   }
 
   protected receive(value: V): void {

@@ -6,7 +6,6 @@
 #include "core/member/arguments.hpp"
 #include "core/member/error_entry.hpp"
 #include "core/member/member_table.hpp"
-#include "core/session/client/unread_reply.hpp"
 #include "core/support/random.hpp"
 #include "core/support/sort.hpp"
 
@@ -346,12 +345,8 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::client_session_op_req)
     return handle_session_op_reply(message, entry, id, std::move(pending.path), now);
   auto result = read_reply(message, entry, pending);
-  if (!result) {
-    auto error = result.error();
-    error.sub_name = unread_reply;
-    result = std::move(error);
-  }
-  emit(Completed{id, std::move(result)});
+  const bool is_unread = !result;
+  emit(Completed{id, std::move(result), is_unread});
   if (pending.type == EntryType::wire_connect_req) handle_wire_connected(pending, id);
 }
 

@@ -56,7 +56,11 @@ struct Connected {
 };
 /// A request ended. What the value is depends on the request (see ClientSession).
 struct Completed {
-  RequestId id = 0;
+  Completed(RequestId of, Result<Value> with, bool cannot_be_read = false)
+      : id(of), is_unread(cannot_be_read), result(std::move(with)) {}
+
+  RequestId id;
+  bool is_unread;  ///< an error: the service has answered, and that can't be read
   Result<Value> result;
 };
 struct EventReceived {

@@ -5,7 +5,7 @@ import { closedHere } from "../session.js";
 import type { EventMember, RrValue } from "../types.js";
 import { within } from "../within.js";
 import type { MemberContext } from "./member.js";
-import { queueLimits, ValueQueue } from "./queue.js";
+import { overflowError, queueLimits, ValueQueue } from "./queue.js";
 
 /** What a loop may be behind. Events are never dropped silently: a loop that is slower ends with an error. */
 const { limit, maxBytes } = queueLimits;
@@ -36,8 +36,7 @@ export function makeEvent({ session, path, info, isReleased }: MemberContext): E
       };
       const overflow = () => {
         end();
-        const what = `more than ${limit} events ${info.name} or ${maxBytes} bytes of them wait`;
-        return makeError("OutOfSystemResource", `${what} and nobody takes them`);
+        return overflowError(info.name, limit, maxBytes);
       };
       const queue = new ValueQueue<RrValue[]>(limit, end, overflow, maxBytes);
       const stopListening = listen((args) => queue.push(args));

@@ -13,7 +13,7 @@ import type {
 import { checkSignal, within } from "../within.js";
 import { lossesOf } from "./member.js";
 import type { MemberContext } from "./member.js";
-import { queueLimits, ValueQueue } from "./queue.js";
+import { overflowError, queueLimits, ValueQueue } from "./queue.js";
 
 /** Packets that wait for their acknowledgement; a service that never sends one must not fill the memory. */
 const maxAcks = 65_536;
@@ -105,8 +105,7 @@ class Endpoint implements PipeEndpoint {
     private readonly gone: () => void,
   ) {
     const overflow = () => {
-      const what = `more than ${limit} packets or ${maxBytes} bytes of pipe ${context.info.name} wait`;
-      const error = makeError("OutOfSystemResource", `${what} and nobody takes them: the endpoint is closed`);
+      const error = overflowError(context.info.name, limit, maxBytes);
       this.#closed ??= this.#disconnect(error);
       return error;
     };

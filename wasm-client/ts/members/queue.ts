@@ -1,7 +1,14 @@
 // What stands between a member that gives and a loop that takes. Layer: wasm-client/ts/members.
+import { makeError } from "../errors.js";
 
 /** What may wait for a consumer that says nothing else. */
 export const queueLimits = { limit: 10_000, maxBytes: 64 * 1024 * 1024 };
+
+/** Why a loop ends where more waits for it than may. */
+export function overflowError(name: string, limit: number, maxBytes: number): Error {
+  const what = `more than ${limit} values of ${name} or ${maxBytes} bytes of them wait`;
+  return makeError("OutOfSystemResource", `${what}, and nobody takes them`);
+}
 
 /** Collects values for one consumer. `limit` 1: only the newest is kept. */
 export class ValueQueue<T> implements AsyncIterator<T, undefined> {

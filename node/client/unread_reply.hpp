@@ -1,4 +1,4 @@
-// Replies that can't be read, apart from those that tell an error. Layer: session.
+// Replies that can't be read, apart from those that tell an error. Layer: node/client.
 #pragma once
 
 #include <string_view>
@@ -7,7 +7,7 @@
 
 namespace rr {
 
-/// The `sub_name` of the errors with which a client session completes a request whose reply is not of the declared
+/// The `sub_name` of the errors with which a ClientConnection completes a request whose reply is not of the declared
 /// type. Their codes are also those by which services refuse arguments, but here the service has carried out the
 /// request.
 inline constexpr std::string_view unread_reply = "UnreadReply";
