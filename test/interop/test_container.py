@@ -221,14 +221,18 @@ def test_the_compose_files_are_such(names):
         assert not errors, errors
     ports = [port.rsplit(":", 1)[0] for service in whole["services"].values() for port in service.get("ports", [])]
     assert len(ports) == len(set(ports)), "two services have one port"
-    subnet = ipaddress.ip_network(whole["networks"]["default"]["ipam"]["config"][0]["subnet"])
+    (addresses,) = whole["networks"]["default"]["ipam"]["config"]
+    subnet = ipaddress.ip_network(addresses["subnet"])
+    handed_out = ipaddress.ip_network(addresses.get("ip_range", addresses["subnet"]))  # to whoever asks for none
+    assert handed_out.subnet_of(subnet)
     for name, service in whole["services"].items():
         assert "image" in service, name
         for volume in service.get("volumes", []):
             source = volume.split(":")[0]
             assert source.startswith("./") or source in whole["volumes"], f"{name}: {volume}"
         for network in service.get("networks", {}).values():
-            assert ipaddress.ip_address(network["ipv4_address"]) in subnet, name
+            fixed = ipaddress.ip_address(network["ipv4_address"])
+            assert fixed in subnet and fixed not in handed_out, f"{name}: {fixed}"
 
 
 def test_the_dashboard_asks_for_what_there_is(tmp_path):
