@@ -1,4 +1,5 @@
 """The gateway as a service: metrics, configuration read anew, what a service manager gives and hears, stopping."""
+import configparser
 import http.client
 import json
 import os
@@ -15,7 +16,7 @@ from chaos import FAKETIME
 from clients import run_and_check
 from gateways import RRGATE, Gateway, read_metrics, running
 from http_api import BASE, Stream, fetch, is_alive, open_websocket
-from processes import free_port
+from processes import ROOT, free_port
 from scenarios import SCENARIO
 
 
@@ -261,6 +262,24 @@ def test_stopping_waits_for_sessions_and_not_for_ever(device, tmp_path):
         assert 0.5 < time.monotonic() - started < 5
         link.close()
         assert gateway.process.process.wait(10) == 0
+
+
+def test_the_unit_starts_again_where_an_address_comes_late_and_not_where_the_configuration_is_wrong(tmp_path):
+    unit = configparser.ConfigParser(strict=False, interpolation=None)
+    unit.optionxform = str
+    unit.read(ROOT / "gateway-config" / "rrgate.service.in")
+    given_up = unit["Service"].get("RestartPreventExitStatus", "").split()
+
+    def serve(config):
+        (tmp_path / "gateway.json").write_text(json.dumps({"devices": [], **config}))
+        done = subprocess.run([str(RRGATE), "serve", tmp_path / "gateway.json"], capture_output=True, text=True, timeout=20)
+        return str(done.returncode), done.stderr
+
+    status, said = serve({"listen": ["192.0.2.1:8080"], "insecure": True})  # an address that this machine has not, or not yet
+    assert "192.0.2.1:8080" in said and status not in ["0", *given_up]
+    assert unit["Service"]["Restart"] == "on-failure" and unit["Unit"]["StartLimitIntervalSec"] == "0", "systemd gives up"
+    status, said = serve({"listne": []})
+    assert "listne" in said and status in given_up
 
 
 def test_sockets_that_listen_already(device, tmp_path):
