@@ -91,7 +91,7 @@ class ReverseProxy:
             if os.getuid() == 0:
                 modules += "\nUser www-data\nGroup www-data"
             return HTTPD.format(folder=self.folder, modules=modules, snippet=snippet)
-        # What is not a tunnel ends after a second of silence: a WebSocket that lives longer is held by its own timeout.
+        # A second of silence ends what no longer timeout of its own holds, as those of WebSockets and slow answers.
         return re.sub(r"timeout (client|server) +30s", r"timeout \1 1s", snippet)
 
     def _command(self):

@@ -4,6 +4,7 @@ import os
 import re
 import socket
 import struct
+import sys
 import time
 
 import pytest
@@ -11,7 +12,8 @@ import yaml
 
 from clients import run_and_check
 from clients import JS, run_program
-from http_api import CLIENT, fetch, open_websocket
+from directions import PEERS
+from http_api import BASE, CLIENT, fetch, open_websocket
 from processes import Background, start_gateway
 from reverse_proxies import CONFIGS, PROXIES, ReverseProxy
 from scenarios import SCENARIO
@@ -154,6 +156,30 @@ def test_an_idle_session(proxy):
     link.sendall(b"\x82\x84\0\0\0\0XXXX")  # no Robot Raconteur: the gateway says so in its close frame
     assert b"from the client: " in link.recv(4096)
     link.close()
+
+
+@pytest.mark.parametrize("config", [*PROXIES.values(), "../cluster/nginx.conf", "../cluster/haproxy.cfg"])
+def test_an_answer_that_takes_its_time(config, tmp_path):
+    """The device is held for longer than clients may be silent: it is the gateway that says how long to wait."""
+    device = Background([sys.executable, PEERS / "service.py"], tmp_path / "device.log")
+    url = json.loads(device.next_line())["url"]
+    process, port = start_gateway(tmp_path, url, trusted_proxies=["127.0.0.1"])
+    name = next((name for name, file in PROXIES.items() if file == config), config.split("/")[-1].split(".")[0])
+    proxy = ReverseProxy(name, config, tmp_path, port, {number: port for number in (8091, 8092, 8093)})
+    try:
+        asked = f"GET {BASE}/p_double HTTP/1.1\r\nHost: 127.0.0.1:{proxy.root}\r\nConnection: close\r\n\r\n".encode()
+        assert fetch(proxy.root, f"{BASE}/p_double")[0] == 200
+        device.pause()
+        with socket.create_connection(("127.0.0.1", proxy.root), IDLE_SECONDS) as link:
+            link.sendall(asked)
+            with pytest.raises(TimeoutError):
+                link.recv(1)
+            device.resume()
+            link.settimeout(10)
+            assert b" 200 " in link.recv(4096)
+    finally:
+        for each in (proxy, process, device):
+            each.stop()
 
 
 @pytest.mark.parametrize("name", ["interop", "shared"])
