@@ -1,6 +1,7 @@
 #include "server/gateway/gateway.hpp"
 
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
@@ -367,6 +368,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   }
   is_stopping_ = true;
   on_stopped_ = std::move(on_stopped);
+  give_adopted_back();
   if (on_stop_) on_stop_();
   if (found_) found_->stop();
   issuer_keys_.stop();
@@ -378,11 +380,13 @@ void Gateway::stop(std::function<void()> on_stopped) {
   asio::co_spawn(io_, drain(), asio::detached);
 }
 
-void Gateway::close_listeners() {
-  for (const auto& listener : listeners_) listener.socket->close();
+/// Whoever handed a socket over keeps it: who connects from now on waits in it for the next gateway. Released before it
+/// is closed, since the kernel forgets what is watched at the last close only, which is not this one.
+void Gateway::give_adopted_back() {
   for (const auto& acceptor : adopted_) {
-    rr::error_code ignored;
-    acceptor->close(ignored);
+    rr::error_code error;
+    const int socket = acceptor->release(error);
+    if (!error) ::close(socket);
   }
 }
 
@@ -409,7 +413,7 @@ rr::awaitable<void> Gateway::drain() {
   };
   auto deadline = std::chrono::steady_clock::now() + config_.timeouts.drain;
   while (has_session() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
-  close_listeners();
+  for (const auto& listener : listeners_) listener.socket->close();
   shared_.stop();
   if (own_service_) own_service_->stop();
   const rr::EndReason reason{1001, "the gateway is stopping"};

@@ -33,7 +33,8 @@ class Gateway : public GatewayState {
   [[nodiscard]] rr::Result<> reconfigure(Config next);
 
   /// Lets sessions end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call
-  /// ends them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
+  /// ends them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why. Sockets that were
+  /// handed over are left at once, so that new clients wait in them.
   void stop(std::function<void()> on_stopped);
   /// Reads certificates, keys, CAs, users and rights anew, and opens the audit log anew. What can't be used stays as it
   /// was, and the log says why. Connections that are open keep what they have.
@@ -60,7 +61,7 @@ class Gateway : public GatewayState {
   void watch_clock();
   /// Ends what goes on for clients whose proof was revoked or has expired.
   void end_those_not_good();
-  void close_listeners();
+  void give_adopted_back();
   void tell_of_nodes();
   bool has_session() const;
   void end_all(const rr::EndReason& reason);

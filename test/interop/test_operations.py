@@ -1,5 +1,6 @@
 """The gateway as a service: metrics, configuration read anew, what a service manager gives and hears, stopping."""
 import configparser
+import contextlib
 import http.client
 import json
 import os
@@ -282,30 +283,60 @@ def test_the_unit_starts_again_where_an_address_comes_late_and_not_where_the_con
     assert "listne" in said and status in given_up
 
 
-def test_sockets_that_listen_already(device, tmp_path):
-    """As systemd hands them over: number 3, and the process that they are for."""
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        port = listener.getsockname()[1]
-        start = f"import os; os.dup2({listener.fileno()}, 3); os.set_inheritable(3, True); os.environ.update(LISTEN_FDS='1', LISTEN_PID=str(os.getpid())); os.execv(os.sys.argv[1], os.sys.argv[1:])"
-        config = tmp_path / "gateway.json"
-        config.write_text(json.dumps({"listen": ["127.0.0.1:1"], "devices": [interop(device)]}))
-        log = tmp_path / "gateway.log"
-        with open(log, "wb") as errors:
-            process = subprocess.Popen([sys.executable, "-c", "import sys;" + start, str(RRGATE), "serve", "--config", str(config)],
-                                       pass_fds=[listener.fileno()], stderr=errors)
+@contextlib.contextmanager
+def handed(listener, folder, devices):
+    """A gateway that is given a socket as systemd does it: number 3, and the process that it is for. (process, its log)"""
+    start = "import os, sys; os.dup2(int(sys.argv[1]), 3); os.set_inheritable(3, True); " \
+        "os.environ.update(LISTEN_FDS='1', LISTEN_PID=str(os.getpid())); os.execv(sys.argv[2], sys.argv[2:])"
+    config, log = folder / "gateway.json", folder / "gateway.log"
+    config.write_text(json.dumps({"listen": ["127.0.0.1:1"], "devices": devices}))
+    with open(log, "wb") as errors:
+        process = subprocess.Popen([sys.executable, "-c", start, str(listener.fileno()), str(RRGATE), "serve", "--config", config],
+                                   pass_fds=[listener.fileno()], stderr=errors)
     try:
-        assert fetch(port, "/healthz")[0] == 200  # a connection waits until somebody takes it
-        process.send_signal(signal.SIGHUP)  # the address of the file is not listened on: nothing fails
-        deadline = time.monotonic() + 10
-        while "configuration read anew" not in log.read_text() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        assert fetch(port, "/readyz")[0] == 200
-        assert "configuration read anew" in log.read_text()
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(10) == 0
+        yield process, log
     finally:
         process.kill()
         process.wait()
+
+
+def says(log, words):
+    deadline = time.monotonic() + 10
+    while words not in log.read_text():
+        assert time.monotonic() < deadline, log.read_text()
+        time.sleep(0.02)
+
+
+def test_sockets_that_listen_already(device, tmp_path):
+    listener = socket.create_server(("127.0.0.1", 0))
+    port = listener.getsockname()[1]
+    with handed(listener, tmp_path, [interop(device)]) as (process, log):
+        listener.close()
+        assert fetch(port, "/healthz")[0] == 200  # a connection waits until somebody takes it
+        process.send_signal(signal.SIGHUP)  # the address of the file is not listened on: nothing fails
+        says(log, "configuration read anew")
+        assert fetch(port, "/readyz")[0] == 200
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+
+
+def test_clients_wait_in_a_socket_that_is_handed_over_while_the_gateway_restarts(device, tmp_path):
+    """Also those that come while a session is still given time to end."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        with handed(listener, tmp_path, [interop(device)]) as (process, log):
+            says(log, "device online")
+            session = open_websocket(port, "/devices/interop", f"Origin: http://127.0.0.1:{port}\r\n")
+            says(log, "client connected")
+            process.send_signal(signal.SIGTERM)
+            says(log, "stopping")
+            late = socket.create_connection(("127.0.0.1", port), 10)
+            late.sendall(b"GET /api/v1/devices HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert is_alive(session)
+            session.close()
+            assert process.wait(10) == 0
+        with handed(listener, tmp_path, []), late:
+            assert b" 200 " in late.recv(4096)
 
 
 def test_a_reload_looks_at_who_reaches_sockets_that_listen_already(tmp_path):
