@@ -7,6 +7,7 @@
 #include "node/platform/file_look.hpp"
 #include "node/platform/text_file.hpp"
 #include "node/tls/digest.hpp"
+#include "node/tls/tls_context.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
 #include "server/limits/client_network.hpp"
@@ -31,7 +32,11 @@ rr::Error in_file(std::string_view what, const std::string& path, const rr::Erro
 }
 
 rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
-  if (config.discovers) return JwtVerifier::without_keys(config.claims);
+  if (config.discovers) {
+    if (const auto trusted = rr::make_web_client_tls({config.ca, {}, {}}); !trusted && !config.ca.empty())
+      return rr::make_error(rr::ErrorCode::invalid_configuration, "CA of the issuer: " + trusted.error().message);
+    return JwtVerifier::without_keys(config.claims);
+  }
   const bool has_keys = !config.jwks_file.empty();
   const auto& path = has_keys ? config.jwks_file : config.secret_file;
   const std::string_view what = has_keys ? "JSON Web Key Set" : "secret";
@@ -47,7 +52,8 @@ std::map<std::string, std::string> look(const AccessConfig& config) {
   for (const auto* file : {&config.users_file, &config.tokens_file, &config.jwt.jwks_file, &config.jwt.secret_file,
                            &config.ticket_key_file})
     if (!file->empty()) out[*file] = rr::file_look(*file);
-  for (const auto& file : config.clients.crl) out[file] = rr::file_look(file);
+  for (const auto* files : {&config.clients.crl, &config.jwt.ca})
+    for (const auto& file : *files) out[file] = rr::file_look(file);
   return out;
 }
 

@@ -7,6 +7,8 @@
 #include "server/cli/findings.hpp"
 #include "server/cli/service_rights.hpp"
 #include "server/config/cautions.hpp"
+#include "server/config/tls_files.hpp"
+#include "server/upstream/found_devices.hpp"
 
 namespace rrgate {
 
@@ -25,16 +27,29 @@ struct CheckedConfig {
   std::size_t devices = 0;
 };
 
+/// What is wrong with the files that the gateway reads when it starts.
+std::vector<Finding> judge_files(const Config& config) {
+  std::vector<Finding> wrong;
+  const auto expect = [&wrong](std::string path, const auto& loaded) {
+    if (!loaded) wrong.push_back({std::move(path), loaded.error().message});
+  };
+  if (const auto& certificates = config.tls.certificates; !certificates.empty())
+    expect("/tls/certificates", rr::make_web_tls(certificates, config.access.clients));
+  expect("/access", load_access(config.access));
+  for (std::size_t i = 0; i < config.devices.size(); ++i)
+    for (const auto& files : {make_device_tls(config.devices[i]), make_device_https(config.devices[i])})
+      if (files) expect("/devices/" + std::to_string(i) + "/tls/ca", files->load());
+  if (config.discover.is_enabled && !config.discover.tls.ca.empty())
+    expect("/discover/tls/ca", FoundDevices::load_tls(config.discover));
+  return wrong;
+}
+
 /// Errors   those of find_missing_rights().
 rr::Result<CheckedConfig> judge(const CheckOptions& options) {
   const auto parsed = load_config(options.file);
   const auto& config = parsed.config;
   if (!parsed.findings.empty()) return CheckedConfig{parsed.findings};
-  if (const auto& certificates = config.tls.certificates; !certificates.empty())
-    if (const auto tls = rr::make_web_tls(certificates, config.access.clients); !tls)
-      return CheckedConfig{{{"/tls/certificates", tls.error().message}}};
-  if (const auto access = load_access(config.access); !access)
-    return CheckedConfig{{{"/access", access.error().message}}};
+  if (auto wrong = judge_files(config); !wrong.empty()) return CheckedConfig{std::move(wrong)};
   CheckedConfig out;
   out.devices = config.devices.size();
   if (options.service_user) {

@@ -34,7 +34,7 @@ std::vector<WantedFile> wanted_files(const std::string& file, const Config& conf
   for (const auto& device : config.devices)
     for (const auto& ca : device.tls.ca) reads(ca);
   for (const auto& ca : config.discover.tls.ca) reads(ca);
-  for (const auto* files : {&config.access.clients.ca, &config.access.clients.crl})
+  for (const auto* files : {&config.access.clients.ca, &config.access.clients.crl, &config.access.jwt.ca})
     for (const auto& each : *files) reads(each);
   // A new token comes in a new file that takes the place of the old one.
   if (const auto& tokens = config.access.tokens_file; !tokens.empty())

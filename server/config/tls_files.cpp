@@ -1,5 +1,6 @@
 #include "server/config/tls_files.hpp"
 
+#include "core/session/url.hpp"
 #include "node/platform/file_look.hpp"
 #include "node/tls/certificate_files.hpp"
 #include "server/log/log.hpp"
@@ -58,6 +59,25 @@ bool TlsFiles::reload() {
   else
     log(LogLevel::error, "TLS files can't be used; those from before stay in use", {{"error", loaded.error().message}});
   return loaded.has_value();
+}
+
+namespace {
+
+bool has_node_tls(const DeviceConfig& device) {
+  const auto* scheme = rr::find_url_scheme(device.url.scheme);
+  return scheme && scheme->is_secure;
+}
+
+}  // namespace
+
+std::shared_ptr<TlsFiles> make_device_tls(const DeviceConfig& device) {
+  return has_node_tls(device) ? std::make_shared<TlsFiles>(device.tls) : nullptr;
+}
+
+std::shared_ptr<TlsFiles> make_device_https(const DeviceConfig& device) {
+  if (!device.url.scheme.ends_with("+wss")) return nullptr;
+  // Of the two, TLS between the nodes has the CAs of the configuration.
+  return std::make_shared<TlsFiles>(TlsFiles::of_https(has_node_tls(device) ? DeviceTls() : device.tls));
 }
 
 }  // namespace rrgate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,5 +47,9 @@ class TlsFiles {
   Looks seen_;
   rr::TlsContextPtr context_;
 };
+
+/// For connections to a device: of TLS between nodes, and of HTTPS around that. Null where its URL wants none.
+std::shared_ptr<TlsFiles> make_device_tls(const DeviceConfig& device);
+std::shared_ptr<TlsFiles> make_device_https(const DeviceConfig& device);
 
 }  // namespace rrgate

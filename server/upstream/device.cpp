@@ -53,21 +53,6 @@ milliseconds around(milliseconds wait) {
   return rr::random_between(wait * 3 / 4, wait * 5 / 4);
 }
 
-bool is_secure(const rr::ConnectionUrl& url) {
-  const auto* scheme = rr::find_url_scheme(url.scheme);
-  return scheme && scheme->is_secure;
-}
-
-bool is_https(const rr::ConnectionUrl& url) {
-  return url.scheme.ends_with("+wss");
-}
-
-/// Of TLS between nodes, where there is that, and HTTPS, the former has the CAs of the configuration.
-std::shared_ptr<TlsFiles> https_files(const DeviceConfig& config) {
-  if (!is_https(config.url)) return nullptr;
-  return std::make_shared<TlsFiles>(TlsFiles::of_https(is_secure(config.url) ? DeviceTls() : config.tls));
-}
-
 }  // namespace
 
 std::string_view to_string(DeviceState state) {
@@ -86,10 +71,8 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
                std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page)
     : config_(std::move(config)),
       dial_options_{whole.timeouts.connect, whole.timeouts.send_stall, config_.proxy, config_.headers},
-      tls_(tls                      ? std::move(tls)
-           : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
-                                    : nullptr),
-      https_(https_files(config_)),
+      tls_(tls ? std::move(tls) : make_device_tls(config_)),
+      https_(make_device_https(config_)),
       retry_(whole.retry),
       request_timeout_(whole.timeouts.request),
       backoff_(retry_.min, retry_.max),

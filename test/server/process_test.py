@@ -85,6 +85,29 @@ class CommandLine(Files):
             self.assertEqual([error["path"] for error in told["errors"]], ["/listen/0"] if code else [])
         self.assertTrue(all(error["text"] for error in told["errors"]))
 
+    def test_what_the_gateway_would_not_start_with_is_no_good_configuration(self):
+        other = os.path.join(self.folder.name, "other.pem")
+        with open(other, "w") as out:
+            out.write("no certificate\n")
+        secure = {"name": "arm", "url": "rrs+tcp://127.0.0.1:1/?service=arm"}
+        plain = {"name": "lamp", "url": "rr+tcp://127.0.0.1:1/?service=lamp"}
+        for ca in (other, "nowhere.pem"):
+            for path, config in {
+                "/devices/1/tls/ca": {"devices": [plain, {**secure, "tls": {"ca": [ca]}}]},
+                "/discover/tls/ca": {"devices": [], "discover": {"tls": {"ca": [ca]}}},
+                "/access": {"devices": [], "access": {"jwt": {
+                    "discover": True, "issuer": "https://127.0.0.1:1", "audience": "lab", "ca": [ca]}}},
+            }.items():
+                with self.subTest(path, ca=ca):
+                    file = self.file({"listen": ["127.0.0.1:0"], **config})
+                    result = run("serve", file)
+                    self.assertEqual(result.returncode, 1, result.stderr)
+                    self.assertIn(os.path.basename(ca), result.stderr)
+                    result = run("check-config", file)
+                    self.assertEqual((result.returncode, result.stdout), (2, ""))
+                    self.assertIn(f"gateway.json: {path}: ", result.stderr)
+                    self.assertIn(os.path.basename(ca), result.stderr)
+
     def test_health_is_told_as_json(self):
         with socket.socket() as nobody:
             nobody.bind(("127.0.0.1", 0))
