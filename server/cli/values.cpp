@@ -40,13 +40,16 @@ bool can_write(const std::string& file) {
   return path.has_filename() && ::eaccess(folder.c_str(), W_OK | X_OK) == 0;
 }
 
-/// Before the device does anything. Throws   NotUnderstood: the file's name is an image's, and the value none;
-/// std::runtime_error: the file can't be written.
-void check_output(const rr::TypeDefinition& type, const rr::TypeRegistry& types, const ValueOptions& options) {
-  const auto& file = options.output;
-  if (is_image_name(file) && !is_image_type(type, types))
-    throw NotUnderstood("its value is no image: " + rr::format_type(type));
+/// Before the device does anything. Throws   std::runtime_error: the file can't be written.
+void expect_writable(const std::string& file) {
   if (!file.empty() && !can_write(file)) throw std::runtime_error(file + ": can't be written");
+}
+
+/// The same. Throws   NotUnderstood, too: the file's name is an image's, and the value none.
+void check_output(const rr::TypeDefinition& type, const rr::TypeRegistry& types, const ValueOptions& options) {
+  if (is_image_name(options.output) && !is_image_type(type, types))
+    throw NotUnderstood("its value is no image: " + rr::format_type(type));
+  expect_writable(options.output);
 }
 
 /// To the terminal, or to the file that --output names.
@@ -66,7 +69,7 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   if (!write_text_file(file, content)) throw std::runtime_error(file + ": can't be written");
 }
 
-/// The same for many values: a file gets a line for each as it comes.
+/// The same for many values: a file gets a line for each as it comes. One that is there stays as it is until then.
 class ValueSink {
  public:
   /// Throws   NotUnderstood; std::runtime_error: the file can't be written.
@@ -74,18 +77,27 @@ class ValueSink {
     if (is_image_name(options.output))
       throw NotUnderstood(rr::quote(options.member) + " is a generator: " + options.output +
                           " would hold one of its values; a file with another ending gets a line of JSON for each");
-    if (options.output.empty()) return;
-    file_.open(options.output, std::ios::binary | std::ios::trunc);
-    check();
+    expect_writable(options.output);
   }
 
   void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {
     if (options_.output.empty()) return print_value(to_json(value, type, types), options_.is_json);
+    open();
     file_ << rr::write_json(to_json(value, type, types)) << std::endl;
     check();
   }
 
+  /// After the last value: without any, the file is empty.
+  void finish() {
+    if (!options_.output.empty()) open();
+  }
+
  private:
+  void open() {
+    if (!file_.is_open()) file_.open(options_.output, std::ios::binary | std::ios::trunc);
+    check();
+  }
+
   void check() const {
     if (!file_) throw std::runtime_error(options_.output + ": can't be written");
   }
@@ -199,7 +211,7 @@ void call_function(const RemoteMember& found, const ValueOptions& options) {
     ValueSink sink(options);
     auto generator = found.object.generator_values(member.name, values);
     for (const auto& value : generator) sink.deliver(value, type, found.types());
-    return;
+    return sink.finish();
   }
   check_output(type, found.types(), options);
   const auto result = wait_showing_bytes(found.object, [&](auto& connection, auto done) {

@@ -22,7 +22,7 @@ import RobotRaconteur as RR
 from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UNREACHABLE, Ran, run, shown_on_terminal
 from directions import PEERS
 from found_nodes import THEIRS, TYPE
-from gateways import RRGATE, Gateway
+from gateways import RRGATE, Gateway, running
 from processes import BUILD, Background, free_port
 from shared_sites import Site, start_service
 from tap import Tap
@@ -345,8 +345,15 @@ def test_each_value_of_a_generator_is_a_line_of_the_file(tmp_path):
     try:
         file = tmp_path / "values.jsonl"
         file.write_text("what was there before\n")
+        with running(tmp_path, {"devices": [{"name": "interop", "url": url, "mode": "shared"}], "access": {
+                "anonymous_role": "guest", "rules": [{"roles": ["guest"], "may": ["read", "subscribe"]}]}}) as gateway:
+            gateway.wait_for("session open", service="interop")
+            beside = f"http://127.0.0.1:{gateway.port}/devices/interop?service=interop"
+            assert Ran(["call", beside, "count_up", "0.5", "3", "-o", file]).refused(REFUSED, "may not call")
+        assert file.read_text() == "what was there before\n"
         assert run("call", url, "count_up", "0.5", "3", "-o", file) == ""
         assert [json.loads(line) for line in file.read_text().splitlines()] == [0.5, 1.5, 2.5]
+        assert run("call", url, "count_up", "0.5", "0", "-o", file) == "" and file.read_text() == ""
         assert run("call", url, "count_up", "0.5", "3").splitlines() == ["0.5", "1.5", "2.5"]
         image = tmp_path / "values.png"
         refused = Ran(["call", url, "count_up", "0.5", "3", "-o", image])
