@@ -2,7 +2,7 @@
 """make_image.py --package rrgate_V_ARCH.deb --debian FOLDER --dockerfile FILE --config gateway.json --output IMAGE.tar
 
 A container image of a Debian package, for any architecture, without running anything of it: the package's programs, page
-and documentation, the shared libraries that the programs need, out of the packages in FOLDER, and what the last stage of the
+and documentation, the shared libraries that the programs need and Debian's CAs, out of the packages in FOLDER, and what the last stage of the
 Dockerfile says of how it is started. The archive is an OCI layout that has the index of `docker save` beside it: podman and
 Docker load it. Its manifest is of Docker's type, since podman ignores the health check of OCI's. The same inputs give the same
 bytes (times are SOURCE_DATE_EPOCH).
@@ -25,6 +25,7 @@ import tarfile
 
 TAKEN = ("usr/bin/rrgate", "usr/libexec/rrgate/", "usr/share/rrgate/", "usr/share/doc/rrgate/copyright")
 USERS = {"etc/passwd": b"rrgate:x:10001:10001::/:/nonexistent\n", "etc/group": b"rrgate:x:10001:\n"}
+CAS, CA_BUNDLE = "usr/share/ca-certificates/mozilla/", "etc/ssl/certs/ca-certificates.crt"
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}
 ELF_MACHINES = {"amd64": 62, "arm64": 183}
 MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
@@ -125,6 +126,13 @@ def tree_of(package, libraries, config):
             place = each[1:] if each.startswith("/") else f"{libraries.folders[0]}/{each}"
             tree[place] = (0o755, data)
             wanted.append((each, data))
+    for deb in libraries.debs:
+        # The package's script would put them into one file when it is installed.
+        if cas := [data for name, (_, data) in sorted(deb.files.items()) if name.startswith(CAS) and name.endswith(".crt")]:
+            tree[CA_BUNDLE] = (0o644, b"".join(cas))
+            used[deb.name] = deb
+    if CA_BUNDLE not in tree:
+        raise SystemExit(f"no package has CAs; there are {', '.join(deb.name for deb in libraries.debs)}")
     # Scanners for known weaknesses look here where there is no dpkg.
     for name, deb in used.items():
         tree[f"var/lib/dpkg/status.d/{name}"] = (0o644, deb.control.encode())

@@ -5,9 +5,13 @@ source=$1
 root=$2
 prebuilt=$source/docker/prebuilt
 
-if [ ! -x "$prebuilt/bin/rrgate" ]; then
+install_packages() {
   apt-get update
-  apt-get install -y --no-install-recommends git
+  apt-get install -y --no-install-recommends "$@"
+}
+
+if [ ! -x "$prebuilt/bin/rrgate" ]; then
+  install_packages git
   cd "$source"
   ./dev setup product
   ./dev build
@@ -24,10 +28,15 @@ cp "$source/docker/gateway.json" "$root/etc/rrgate/gateway.json"
 echo 'rrgate:x:10001:10001::/:/nonexistent' >"$root/etc/passwd"
 echo 'rrgate:x:10001:' >"$root/etc/group"
 
+# The CAs that every Debian trusts: SSL_CERT_FILE names them.
+cas=/usr/share/ca-certificates/mozilla
+[ -d "$cas" ] || install_packages ca-certificates
+mkdir -p "$root/etc/ssl/certs"
+cat "$cas"/*.crt >"$root/etc/ssl/certs/ca-certificates.crt"
+
 programs="$root/usr/bin/rrgate $root/usr/libexec/rrgate/*"
 if ldd $programs | grep -q 'not found'; then
-  apt-get update
-  apt-get install -y --no-install-recommends libjpeg62-turbo libqrencode4 libspdlog1.10 libssl3 libusb-1.0-0 zlib1g
+  install_packages libjpeg62-turbo libqrencode4 libspdlog1.10 libssl3 libusb-1.0-0 zlib1g
 fi
 ldd $programs | sed -n 's|.*=> \(/[^ ]*\) .*|\1|p; s|^[[:space:]]*\(/[^ ]*ld-linux[^ ]*\) .*|\1|p' | sort -u |
   while read -r library; do

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import ssl
 import subprocess
 import sys
 import time
@@ -124,6 +125,17 @@ def test_the_image_is_small_and_nobody_is_root(podman, image):
     assert about["User"] == about["Config"]["User"] == "10001:10001"
     assert about["Healthcheck"]["Test"][:3] == ["CMD", "/usr/bin/rrgate", "health"]
     print(f"{about['Size'] / 1e6:.1f} MB")
+
+
+def test_the_image_trusts_the_cas_of_debian(podman, image, tmp_path):
+    (about,) = json.loads(podman("image", "inspect", image))
+    (file,) = [each.split("=")[1] for each in about["Config"]["Env"] if each.startswith("SSL_CERT_FILE=")]
+    podman("create", "--name=cas", "--network=host", "--cgroups=disabled", image)
+    try:
+        podman("cp", f"cas:{file}", tmp_path / "cas.pem")
+    finally:
+        podman("rm", "-f", "cas", fails=True)
+    assert len(ssl.create_default_context(cafile=tmp_path / "cas.pem").get_ca_certs()) > 100
 
 
 def test_a_container(podman, image, tmp_path):
