@@ -72,9 +72,10 @@ Result<std::unique_ptr<ByteStream>> open_driver_device(const asio::any_io_execut
   const auto path = roots.devices + "/" + device.name;
   const auto fail = [&path](int code, const std::string& what) {
     if (code == EACCES || code == EPERM)
-      return make_error(ErrorCode::system_resource_permission_denied,
-                        path + ": " + what + ": permission denied; this user needs to read and write it: see " +
-                            "60-robotraconteur-usb.rules");
+      return make_error(
+          ErrorCode::system_resource_permission_denied,
+          path + ": " + what + ": permission denied; this user needs to read and write it: see " +
+              "60-robotraconteur-usb.rules, and /etc/apparmor.d/local/rrgate where AppArmor confines the service");
     return make_error(ErrorCode::connection_error, path + ": " + what + ": " + std::strerror(code));
   };
   const int number = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);

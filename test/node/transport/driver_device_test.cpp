@@ -289,8 +289,8 @@ TEST_CASE("without permission the message says what to do") {
   const auto message = refusal(machine, "rr+pci:///?nodename=arm.one&service=x");
   if (was_root) REQUIRE(::seteuid(0) == 0);
   fs::permissions(machine.root() / "dev", fs::perms::owner_all);
-  CHECK(message.find("permission denied; this user needs to read and write it: see 60-robotraconteur-usb.rules") !=
-        std::string::npos);
+  CHECK(message.find("permission denied; this user needs to read and write it: see 60-robotraconteur-usb.rules, and "
+                     "/etc/apparmor.d/local/rrgate where AppArmor confines the service") != std::string::npos);
 }
 
 TEST_CASE("a watch hands out the list at once and again") {
