@@ -593,6 +593,20 @@ describe("a board", () => {
   });
 });
 
+test("definitions whose blocks end with their own word are read as others", () => {
+  const create = new Definitions([
+    "service old.create\noption version 0.5\nstruct Packet\n    field uint8 ID\nend struct\nenum Mode\n    off, on\nend\tenum\n" +
+      "object Create\n    implements old.base.Base\nend object\nstruct Last\n    field double end_time\nend",
+  ]);
+  expect(create.struct("Packet", "old.create")?.fields.map(({ name }) => name)).toEqual(["ID"]);
+  expect([...(create.enum("Mode", "old.create")?.values ?? [])]).toEqual([
+    ["off", 0],
+    ["on", 1],
+  ]);
+  expect(create.implemented("old.create.Create")).toContain("old.base.Base");
+  expect(create.struct("Last", "old.create")?.fields.map(({ name }) => name)).toEqual(["end_time"]);
+});
+
 test("code quotes what comes from the device", () => {
   const member: Member = {
     name: "Drive",

@@ -128,7 +128,7 @@ function readDefinition(text: string): Definition {
     else if (word === "using") definition.using.set(second === "as" && third ? third : last(first), first);
     else if (word === "struct" || word === "pod" || word === "namedarray" || word === "enum" || word === "object") {
       const body: string[] = [];
-      for (i++; i < lines.length && lines[i]?.trim() !== "end"; i++) body.push((lines[i] ?? "").trim());
+      for (i++; i < lines.length && !isEnd(lines[i] ?? ""); i++) body.push((lines[i] ?? "").trim());
       const name = `${definition.name}.${first}`;
       if (word === "enum") definition.enums.set(first, { name, values: readEnum(body) });
       else if (word === "object") definition.objects.set(first, readImplements(body));
@@ -136,6 +136,11 @@ function readDefinition(text: string): Definition {
     }
   }
   return definition;
+}
+
+/** Old definitions write `end struct`. */
+function isEnd(line: string): boolean {
+  return /^end(\s+\w+)?$/.test(line.trim());
 }
 
 function readImplements(body: readonly string[]): string[] {
