@@ -630,6 +630,30 @@ test("code quotes what comes from the device", () => {
   );
 });
 
+test("code in JavaScript names the type of a varvalue that a script could not tell", () => {
+  const member: Member = {
+    name: "goal",
+    kind: "property",
+    type: "varvalue",
+    parameters: [],
+    modifiers: [],
+    documentation: "",
+  };
+  const place = { device: "d", service: "s", object: "" };
+  const pose = Object.defineProperty({ x: 1 }, Symbol.for("rrgate.type"), { value: "com.example.arm.Pose" });
+  const script = (value: unknown) => asCode("JavaScript", "http://h/", place, member, [value], { definitions, scope });
+  const draft = draftOf(pose, "varvalue", definitions, scope);
+  expect(script(valueOf(draft, "varvalue", definitions, scope))).toContain(
+    '.set(rrValue("com.example.arm.Pose", { "x": 1 }))',
+  );
+  const edited = valueOf({ ...draft, text: '{"x": 2}' } as never, "varvalue", definitions, scope);
+  expect(script(edited)).toContain('.set(rrValue("com.example.arm.Pose", { "x": 2 }))');
+  expect(script([edited])).toContain('.set([rrValue("com.example.arm.Pose", { "x": 2 })])');
+  expect(script(edited)).toContain('import { connect, rrValue } from "rrgate-client";');
+  expect(script({ type: "bolt", value: 1 })).toContain('.set({ "type": "bolt", "value": 1 })');
+  expect(script(1)).toContain('import { connect } from "rrgate-client";');
+});
+
 test("code, tables and forms round no 64-bit integer, and keep numbers that JSON has not", () => {
   const wide = 9007199254740993n;
   const member: Member = {

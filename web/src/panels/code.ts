@@ -4,7 +4,7 @@
 import { parseStep, splitSteps } from "../app/router";
 import type { Member } from "../robot/remote";
 import type { Definitions } from "../values/definitions";
-import { jsonOf } from "../values/draft";
+import { jsonOf, namedOf } from "../values/draft";
 import { inputsOf } from "./panel";
 import { PythonCode } from "./python_code";
 
@@ -42,7 +42,7 @@ function javaScript(url: string, { object }: CodePlace, member: Member, values: 
   const verb = { function: "", property: ".set", wire: ".poke" }[member.kind as "function" | "property" | "wire"];
   const found = object === "" ? "" : `const object = await robot.$.find(${JSON.stringify(`*.${object}`)});\n`;
   return [
-    'import { connect } from "rrgate-client";',
+    `import { ${args.includes("rrValue(") ? "connect, rrValue" : "connect"} } from "rrgate-client";`,
     `const robot = await connect(${JSON.stringify(url)});`,
     `${found}console.log(await ${object === "" ? "robot" : "object"}.$.member(${JSON.stringify(member.name)})${verb}(${args}));`,
   ].join("\n");
@@ -52,6 +52,12 @@ function javaScript(url: string, { object }: CodePlace, member: Member, values: 
 function literal(value: unknown): string {
   if (typeof value === "bigint") return `${value}n`;
   if (typeof value === "number") return String(value);
+  const named = namedOf(value);
+  if (named) return `rrValue(${JSON.stringify(named.type)}, ${plainLiteral(named.value)})`;
+  return plainLiteral(value);
+}
+
+function plainLiteral(value: unknown): string {
   if (ArrayBuffer.isView(value)) return literal(Array.from(value as unknown as ArrayLike<unknown>));
   if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
   if (value instanceof Map)

@@ -1,7 +1,7 @@
 // A value while it is typed in: the same shape as its type, with texts where the value has words.
 // Layer: web/values, pure. Maps and arrays instead of objects, so that a field may have any name.
 
-import { rrValue, typeOf } from "rrgate-client";
+import { type ExactValue, rrValue, typeOf } from "rrgate-client";
 
 import type { Definitions } from "./definitions";
 import { enumName } from "./definitions";
@@ -218,6 +218,22 @@ export function formatUuid(bytes: unknown): string {
   return digits.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
+/** What `exact` has made: a structure may have the same fields. */
+const exactValues = new WeakSet<object>();
+
+function exact(type: string, value: unknown): ExactValue {
+  const made = rrValue(type, value);
+  exactValues.add(made);
+  return made;
+}
+
+/** The named type that a varvalue has to be sent as, and its value; undefined where the value says all. */
+export function namedOf(value: unknown): ExactValue | undefined {
+  if (typeof value === "object" && value !== null && exactValues.has(value)) return value as ExactValue;
+  const type = typeOf(value);
+  return type === undefined ? undefined : { type, value };
+}
+
 /** It stays of the type that the device had, where that can be told; else it is JSON, or a text. */
 function varvalueOf(text: string, was: unknown): unknown {
   if (typeof was === "string") return text;
@@ -227,7 +243,7 @@ function varvalueOf(text: string, was: unknown): unknown {
   const isFraction = items?.includes("int") === true && /\d\.\d|\de/i.test(text);
   if (items !== undefined) return parseInput(text, isFraction ? "double[]" : `${items}[]`);
   const named = typeOf(was);
-  if (named !== undefined) return rrValue(named, parseInput(text, named));
+  if (named !== undefined) return exact(named, parseInput(text, named));
   if (was instanceof Map)
     return parseInput(text, [...was.keys()].some(Number.isInteger) ? "varvalue{int32}" : "varvalue{string}");
   const cells = itemsOf((was as { data?: unknown } | null | undefined)?.data);
