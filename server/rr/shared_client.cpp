@@ -47,8 +47,9 @@ void SharedClient::close_service() {
 
 /// A right to disconnect is the same as that to connect, and asking for it is not recorded.
 void SharedClient::review() {
-  for (const auto& [path, member] : std::set(wires_)) {
+  for (const auto& [key, member] : std::map(wires_)) {
     if (!service_) return;  // what was sent has ended the session, and the members may be gone
+    const auto& path = key.first;
     if (session_.admits(rr::EntryType::wire_disconnect_req, path, member)) continue;
     home_->leave_wire(*this, path, *member);
     close_wire(path, *member);
@@ -130,12 +131,12 @@ void SharedClient::handle(const rr::LeaveWanted&) {
 
 void SharedClient::handle(const rr::WireConnected& connected) {
   if (!service_) return;
-  wires_.emplace(connected.path, connected.member);
+  wires_.insert_or_assign({connected.path, connected.member->name}, connected.member);
   home_->join_wire(*this, connected.path, *connected.member);
 }
 
 void SharedClient::handle(const rr::WireDisconnected& disconnected) {
-  wires_.erase({disconnected.path, disconnected.member});
+  wires_.erase({disconnected.path, disconnected.member->name});
   if (home_) home_->leave_wire(*this, disconnected.path, *disconnected.member);
 }
 
@@ -154,7 +155,7 @@ void SharedClient::receive_wire(rr::WirePacket& packet) {
 }
 
 void SharedClient::answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) {
-  if (!result) wires_.erase({path, &wire});
+  if (!result) wires_.erase({path, wire.name});
   session_.answer_wire(path, wire, result, rr::read_clocks());
   settle();
 }
@@ -164,7 +165,7 @@ void SharedClient::note_conflated(const std::string& path, const rr::MemberDefin
 }
 
 void SharedClient::close_wire(const std::string& path, const rr::MemberDefinition& wire) {
-  wires_.erase({path, &wire});
+  wires_.erase({path, wire.name});
   session_.close_wire(path, wire, rr::read_clocks());
   settle();
 }
@@ -262,7 +263,7 @@ void SharedClient::receive_event(rr::EventPacket& packet) {
 }
 
 void SharedClient::release_path(const std::string& path) {
-  std::erase_if(wires_, [&](const auto& wire) { return rr::is_within(wire.first, path); });
+  std::erase_if(wires_, [&](const auto& wire) { return rr::is_within(wire.first.first, path); });
   std::erase_if(pipes_, [&](const auto& pipe) { return rr::is_within(pipe.second.path, path); });
   session_.release_path(path, rr::read_clocks());
   settle();
@@ -373,8 +374,8 @@ void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {
   home_ = std::move(upstream);
   home_->add(*this);
   // What is sent meanwhile may end the client.
-  for (const auto& [path, member] : std::set(wires_))
-    if (service_) home_->join_wire(*this, path, *member);
+  for (const auto& [key, member] : std::map(wires_))
+    if (service_) home_->join_wire(*this, key.first, *member);
   for (const auto& [id, pipe] : std::unordered_map(pipes_))
     if (service_) home_->join_pipe(*this, id, pipe.path, *pipe.member);
 }

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -151,7 +151,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   std::shared_ptr<SharedService> service_;
   std::shared_ptr<Upstream> home_;   ///< the shared one, or that of the user who has logged in at the device
   std::shared_ptr<Upstream> login_;  ///< the latter; null: there is none
-  std::set<std::pair<std::string, const rr::MemberDefinition*>> wires_;
+  /// By path and name, as the service defines them that the client is connected to.
+  std::map<std::pair<std::string, std::string>, const rr::MemberDefinition*> wires_;
   std::unordered_map<rr::PipeId, Endpoint> pipes_;
   std::unordered_map<rr::CallbackId, rr::ClientConnection::CallbackReply> callbacks_;
 };

@@ -103,10 +103,10 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
   }
   for (const auto& [key, wire] : wires_)
     if (wire->out_value && wire->out_value->sender == &client) wire->out_value.reset();
-  std::vector<std::pair<std::string, const rr::MemberDefinition*>> wires;
+  std::vector<std::shared_ptr<Wire>> wires;
   for (const auto& [key, wire] : wires_)
-    if (has_joined(client, key)) wires.emplace_back(key.first, &wire->member);
-  for (const auto& [path, member] : wires) leave_wire(client, path, *member);
+    if (has_joined(client, key)) wires.push_back(wire);
+  for (const auto& wire : wires) leave_wire(client, wire->path, wire->member);
   std::vector<rr::GeneratorId> generators;
   for (const auto& [key, generator] : generators_)
     if (key.first == &client) generators.push_back(key.second);

@@ -245,11 +245,11 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     rr::Value value;
   };
   struct Wire {
-    Wire(std::string its_path, const rr::MemberDefinition& its_member)
-        : path(std::move(its_path)), member(its_member) {}
+    Wire(std::string its_path, rr::MemberDefinition its_member)
+        : path(std::move(its_path)), member(std::move(its_member)) {}
 
     const std::string path;
-    const rr::MemberDefinition& member;
+    const rr::MemberDefinition member;  ///< a copy: the client that has brought it may leave first
     std::vector<Follower> followers;
     std::size_t next = 0;  ///< before the follower whose turn it is
     std::shared_ptr<const rr::WireValue> newest;
@@ -264,7 +264,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   enum class PipeState : std::uint8_t { detached, attaching, attached };
   struct Pipe {
     std::string path;
-    const rr::MemberDefinition* member = nullptr;
+    rr::MemberDefinition member = {};  ///< a copy, as for wires
     std::vector<EndpointKey> endpoints;
     std::int32_t index = 0;
     PipeState state = PipeState::detached;

@@ -212,7 +212,7 @@ void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::strin
   const auto number = ++last_pipe_;
   auto& pipe = pipes_[number];
   pipe.path = path;
-  pipe.member = &member;
+  pipe.member = member;
   pipe.endpoints.push_back(endpoint);
   endpoints_[endpoint] = number;
   if (is_shared) shared_pipes_[key] = number;
@@ -254,8 +254,8 @@ void Upstream::attach_pipe(PipeNumber number) {
   };
   const bool is_first = pipe.index == 0;
   connection_->connect_pipe(
-      pipe.path, pipe.member->name, rr::any_pipe_index, std::move(handlers),
-      [weak, number, is_first, path = pipe.path, member = pipe.member->name](const rr::Result<rr::Value>& result) {
+      pipe.path, pipe.member.name, rr::any_pipe_index, std::move(handlers),
+      [weak, number, is_first, path = pipe.path, member = pipe.member.name](const rr::Result<rr::Value>& result) {
         const auto self = weak.lock();
         if (self) self->pipe_attached(number, path, member, result, is_first);
       });
@@ -275,7 +275,7 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
     const auto endpoints = pipe.endpoints;
     if (!is_first) return drop_pipe(number);
     for (const auto& endpoint : endpoints) end_endpoint(endpoint);
-    shared_pipes_.erase({pipe.path, pipe.member->name});
+    shared_pipes_.erase({pipe.path, pipe.member.name});
     pipes_.erase(found);
     for (const auto& endpoint : endpoints)
       if (has(*endpoint.first)) endpoint.first->refuse_pipe(endpoint.second, result.error());
@@ -302,8 +302,8 @@ void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
   std::erase(pipe.endpoints, endpoint);
   if (!pipe.endpoints.empty()) return pace_pipe(number);
   if (connection_ && pipe.state == PipeState::attached)
-    connection_->disconnect_pipe(pipe.path, pipe.member->name, pipe.index, ignore_result);
-  if (pipe.member->direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member->name});
+    connection_->disconnect_pipe(pipe.path, pipe.member.name, pipe.index, ignore_result);
+  if (pipe.member.direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member.name});
   pipes_.erase(found);
 }
 
@@ -315,7 +315,7 @@ void Upstream::drop_pipe(PipeNumber number) {
   const auto dropped = pipes_.extract(number);
   if (!dropped) return;
   const auto& pipe = dropped.mapped();
-  if (const auto known = shared_pipes_.find({pipe.path, pipe.member->name});
+  if (const auto known = shared_pipes_.find({pipe.path, pipe.member.name});
       known != shared_pipes_.end() && known->second == number)
     shared_pipes_.erase(known);
   for (const auto& endpoint : pipe.endpoints) end_endpoint(endpoint);
@@ -330,7 +330,7 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
   auto known = endpoints_.find(endpoint);
   if (known == endpoints_.end()) return is_closed;
   const auto& asked = pipes_.at(known->second);
-  const auto allowed = locks_->check_packet(client, asked.path, *asked.member);
+  const auto allowed = locks_->check_packet(client, asked.path, asked.member);
   known = endpoints_.find(endpoint);  // a lease that has ended meanwhile had something sent: the session may be lost
   if (known == endpoints_.end()) return is_closed;
   auto& pipe = pipes_.at(known->second);
@@ -340,7 +340,7 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
   if (sent) return {};
   log(LogLevel::info, "pipe endpoint closed: its packet was not taken",
       {{"device", device_->config().name},
-       {"pipe", pipe.path + "." + pipe.member->name},
+       {"pipe", pipe.path + "." + pipe.member.name},
        {"error", sent.error().message}});
   end_pipe(client, id);
   return sent;
@@ -364,9 +364,9 @@ rr::Result<> Upstream::pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr
                                std::optional<std::uint32_t> wants_ack) {
   const auto connection = connection_;  // it may be lost
   pipe.has_sent = true;
-  if (!wants_ack) return connection->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
+  if (!wants_ack) return connection->send_pipe(pipe.path, pipe.member.name, pipe.index, packet);
   const auto known = endpoint;
-  const auto sent = connection->send_pipe_for_ack(pipe.path, pipe.member->name, pipe.index, packet);
+  const auto sent = connection->send_pipe_for_ack(pipe.path, pipe.member.name, pipe.index, packet);
   if (!sent) return sent.error();
   const auto found = endpoints_.find(known);
   if (found == endpoints_.end()) return {};
@@ -415,7 +415,7 @@ void Upstream::pace_pipe(PipeNumber number) {
   if (is_held == pipe.is_held) return;
   pipe.is_held = is_held;
   const auto connection = connection_;  // it may be lost
-  connection->hold_pipe_acks(pipe.path, pipe.member->name, pipe.index, is_held);
+  connection->hold_pipe_acks(pipe.path, pipe.member.name, pipe.index, is_held);
 }
 
 }  // namespace rrgate

@@ -111,7 +111,8 @@ rr::awaitable<rr::Result<ValueClient::ListenerPtr>> ValueClient::listen(MemberPl
   auto kept = std::make_shared<SampleHandler>(std::move(handler));
   auto listener = std::make_unique<Listener>(self, key, id);
   auto& topic = topics_[key];
-  if (!topic.place.member) topic.place = std::move(place);
+  // The device may have come back with another definition since the member was joined last.
+  if (!topic.place.member || topic.state == TopicState::idle) topic.place = std::move(place);
   const auto kind = topic.place.member->kind;
   const bool is_wire = kind == rr::MemberKind::wire;
   topic.handlers[id] = kept;

@@ -23,7 +23,7 @@ class UpstreamBench {
   explicit UpstreamBench(const std::shared_ptr<rr::Service>& service, LeaseConfig leases = {})
       : node(io, "test.device") {
     node.add(service);
-    const auto port = node.listen("rr+tcp://127.0.0.1:0");
+    port = node.listen("rr+tcp://127.0.0.1:0");
     DeviceConfig made;
     made.name = "device";
     made.mode = DeviceMode::shared;
@@ -36,6 +36,7 @@ class UpstreamBench {
     upstream->close();
     device->stop();
     node.stop();
+    if (newer_node) newer_node->stop();
     io.restart();
     io.run_for(std::chrono::seconds(2));
   }
@@ -66,6 +67,14 @@ class UpstreamBench {
     auto out = begin(std::move(work));
     REQUIRE(run_until([&] { return out->has_value(); }));
     return std::move(**out);
+  }
+  /// The device is lost, and comes back with another service in the place of the first.
+  void replace_device(const std::shared_ptr<rr::Service>& service) {
+    node.stop();
+    REQUIRE(run_until([&] { return !upstream->is_open(); }));
+    newer_node.emplace(io, "test.device");
+    newer_node->add(service);
+    newer_node->listen("rr+tcp://127.0.0.1:" + std::to_string(port));
   }
   void open() { REQUIRE(wait_for(upstream->open()).has_value()); }
   rr::Result<rr::Value> find(const std::string& path) {
@@ -101,6 +110,8 @@ class UpstreamBench {
   boost::asio::io_context io{1};
   Config config;
   rr::Node node;
+  std::optional<rr::Node> newer_node;
+  std::uint16_t port = 0;
   std::shared_ptr<Device> device;
   std::shared_ptr<Upstream> upstream;
 };

@@ -26,6 +26,7 @@ object Bench
     event struck(int32 number)
     wire double level [readonly]
     wire double wish [writeonly]
+    pipe int32 news [readonly]
     property int32 number
     callback int32 ask()
     function int32{generator} count()
@@ -435,6 +436,37 @@ TEST_CASE("a request to an object that is of another type than its client was to
   CHECK(answer.error().code == rr::ErrorCode::object_not_found);
   CHECK(client.heard == std::vector{"released " + path});
   CHECK(released == std::vector{path});
+}
+
+TEST_CASE(
+    "who has joined a wire or a pipe needs nothing of the definition by which a client that has left had joined it") {
+  const std::string member = GENERATE("level", "news");
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  auto of_first = *bench.upstream->object_type("bench")->find_member(member);
+  const auto own = of_first;
+  auto first = std::make_unique<HearingClient>(bench.upstream);
+  HearingClient second(bench.upstream);
+  std::string received;
+  second.on_wire = [&](const rr::WirePacket& packet) { received = packet.member().name; };
+  const auto join = [&](HearingClient& client, const rr::MemberDefinition& definition_of_client) {
+    if (member == "level") return bench.upstream->join_wire(client, "bench", definition_of_client);
+    bench.upstream->join_pipe(client, 1, "bench", definition_of_client);
+  };
+  join(*first, of_first);
+  join(second, own);
+  REQUIRE(bench.run_until([&] { return second.heard.size() == 1; }));
+  first.reset();
+  of_first.name = "forgotten";
+  cut(bench, bench.upstream);
+  bench.open();
+  REQUIRE(bench.run_until([&] { return second.heard.size() == 2; }));
+  CHECK(second.heard.back() == second.heard.front());
+  if (member == "news") return;
+  device.service->set_wire("level", 2.5);
+  REQUIRE(bench.run_until([&] { return !received.empty(); }));
+  CHECK(received == "level");
 }
 
 TEST_CASE("what one login is refused after an outage stays with all others") {

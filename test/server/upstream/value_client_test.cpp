@@ -23,12 +23,25 @@ end
 
 const std::string part = "rack.parts[1]";
 
+/// The same with other types.
+constexpr const char* newer_definition = R"(service test.rack
+stdver 0.10
+object Part
+    pipe double news [readonly]
+    wire double level [readonly]
+end
+object Rack
+    objref Part{int32} parts
+end
+)";
+
 struct Rack {
   std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "rack", "Rack");
   std::shared_ptr<rr::Object> newest_part;
   UpstreamBench bench;
   std::shared_ptr<ValueClient> client;
   std::vector<std::string> heard;
+  std::vector<double> values;
 
   Rack() : bench(prepared()) {
     bench.open();
@@ -40,11 +53,18 @@ struct Rack {
     service->objref("parts", [this](std::string_view) { return newest_part = service->make_object("Part"); });
     return service;
   }
+  /// The device restarts with the newer definition.
+  void redefine() {
+    service = rr::Service::from_text({newer_definition}, "rack", "Rack");
+    bench.replace_device(prepared());
+    bench.open();
+  }
   auto listen(const std::string& member) {
     const auto types = bench.upstream->types();
     MemberPlace place{part, types->find_entity("test.rack.Part")->find_member(member), types};
     return bench.begin(client->listen(std::move(place), 0, [this](const SamplePtr& sample, const rr::Error* error) {
       heard.push_back(sample ? "value" : error ? error->message : "back");
+      if (sample) values.push_back(sample->values.front().to<double>().value());
     }));
   }
 };
@@ -94,6 +114,28 @@ TEST_CASE("a wire's value of before an outage is given to nobody who comes in it
   const auto second = rack.listen("level");
   REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
   CHECK(rack.heard == std::vector<std::string>{"value", "connection_lost: device 'device': the line was cut"});
+}
+
+TEST_CASE("who joins a member that the device defines anew has the new definition, and those of before are let go") {
+  const std::string member = GENERATE("news", "level");
+  Rack rack;
+  auto first = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  const std::weak_ptr<const rr::TypeRegistry> before = rack.bench.upstream->types();
+  rack.redefine();
+  REQUIRE(rack.bench.upstream->types() != before.lock());
+  REQUIRE(rack.bench.find(part).has_value());
+  const auto second = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  REQUIRE((**second).has_value());
+  CHECK(before.expired());
+  first->reset();
+  if (member == "level")
+    rack.newest_part->set_wire("level", 2.5);
+  else
+    rack.newest_part->pipe("news").broadcast(2.5);
+  REQUIRE(rack.bench.run_until([&] { return !rack.values.empty(); }));
+  CHECK(rack.values.back() == 2.5);
 }
 
 TEST_CASE("a client that leaves while it joins a member waits no longer, and joins nothing any more") {
