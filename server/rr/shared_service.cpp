@@ -74,6 +74,9 @@ void SharedService::forget_released(Upstream& upstream) const {
 void SharedService::start(std::chrono::milliseconds rests_after) {
   upstream_->rest_unused(rests_after);
   forget_released(*upstream_);
+  upstream_->on_types_replaced([weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->publish_anew();
+  });
   upstream_->keep_open(device_->retry(), [weak = weak_from_this()] {
     const auto self = weak.lock();
     return self ? self->publish() : rr::Result<>();
@@ -121,6 +124,12 @@ rr::Result<> SharedService::publish() {
   renew_judge();
   offer_again();
   return {};
+}
+
+/// Objects behind a varobject bring definitions that nobody has asked for when the session was opened.
+void SharedService::publish_anew() {
+  if (!hosted_ || !upstream_->is_open()) return;  // else it is published when the session is opened, or never
+  if (!publish()) upstream_->break_off();         // what can't be offered is told when the session is opened anew
 }
 
 void SharedService::offer_again() {

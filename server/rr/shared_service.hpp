@@ -72,6 +72,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
  private:
   void forget_released(Upstream& upstream) const;
   rr::Result<> publish();
+  void publish_anew();
   void withdraw();
 
   std::shared_ptr<Device> device_;

@@ -1,6 +1,7 @@
 #include "server/upstream/upstream.hpp"
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
 
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
@@ -130,6 +131,10 @@ rr::Result<> Upstream::take_over_definitions(const rr::TypeRegistry& from) {
     const auto changed = rr::make_error(rr::ErrorCode::invalid_state, "the service has changed");
     while (!wires_.empty()) drop_wire(MemberKey(wires_.begin()->first), &changed);
     while (!pipes_.empty()) drop_pipe(pipes_.begin()->first);
+    if (types_)
+      asio::post(device_->executor(), [weak = weak_from_this()] {
+        if (const auto self = weak.lock(); self && self->on_types_replaced_) self->on_types_replaced_();
+      });
     types_ = std::make_shared<rr::TypeRegistry>();
   }
   std::vector<std::string> texts;

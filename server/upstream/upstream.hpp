@@ -159,6 +159,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::Error lost_error(const std::optional<rr::Error>& reason) const;
   /// The objects at and below a path were replaced.
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
+  /// types() is another one, since the device defines something that was known in another way now. Called later, not
+  /// by whoever has found that out.
+  void on_types_replaced(std::function<void()> handler) { on_types_replaced_ = std::move(handler); }
 
   void add(UpstreamClient& client);
   /// Ends all that the client has here. `left`  is called once the device has its locks back, maybe at once.
@@ -377,6 +380,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   boost::asio::steady_timer attempted_;  ///< cancelled when an attempt is over
   std::shared_ptr<rr::TypeRegistry> types_;
   std::function<void(const std::string&)> on_released_;
+  std::function<void()> on_types_replaced_;
   std::vector<UpstreamClient*> clients_;        ///< in the order in which they came
   std::uint64_t clients_left_ = 0;              ///< how many ever have: while none does, nobody has to be looked up
   std::map<std::string, std::string> objects_;  ///< paths that were found -> what they are of

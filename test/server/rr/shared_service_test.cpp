@@ -1,4 +1,5 @@
-// Objects of a shared service that are of another type once the device is back, whichever session had found them.
+// Objects of a shared service that are of another type once the device is back, or whose type is defined anew,
+// whichever session had found them.
 #include "server/rr/shared_service.hpp"
 
 #include "test/server/upstream/upstream_bench.hpp"
@@ -18,6 +19,25 @@ object Shelf
     objref varobject{int32} things
 end
 )";
+
+constexpr const char* box_definition = R"(service test.box
+stdver 0.10
+object Box
+    objref varobject{int32} things
+end
+)";
+
+/// It comes with the first lamp that is found in the box.
+std::string lamp_definition(const std::string& type) {
+  return "service test.lamp\nstdver 0.10\nobject Lamp\n    property " + type + " light\nend\n";
+}
+
+std::shared_ptr<rr::Service> box_of_lamps(const std::string& type) {
+  const auto box = rr::Service::from_text({box_definition, lamp_definition(type)}, "box", "test.box.Box");
+  box->root().objref(
+      "things", [weak = std::weak_ptr(box)](std::string_view) { return weak.lock()->make_object("test.lamp.Lamp"); });
+  return box;
+}
 
 const std::string path = "shelf.things[1]";
 
@@ -93,4 +113,36 @@ TEST_CASE("an object that a session of one client finds to be another one is not
   REQUIRE(shelf.bench.wait_for(shelf.own->open()).has_value());
   CHECK(shelf.bench.run_until([&] { return !shelf.service->hosted()->has_object(path); }));
   CHECK_FALSE(shelf.service->upstream()->is_open());
+}
+
+TEST_CASE("a definition behind a varobject that the device has changed is offered as it is now") {
+  const std::string lamp = "box.things[1]";
+  UpstreamBench bench(box_of_lamps("int32"));
+  auto config = bench.device->config();
+  bench.config.retry = {10s, 10s, 10s};
+  bench.device->become(config, bench.config);
+  Offering board;
+  const auto service = std::make_shared<SharedService>(bench.device, "box", std::vector<ServiceBoard*>{&board});
+  service->start(0ms);
+  REQUIRE(bench.run_until([&] { return service->hosted() != nullptr; }));
+  const auto upstream = service->upstream();
+  bool is_found = false;
+  service->find_object(*upstream, lamp, [&](const rr::Result<>& found) { is_found = found.has_value(); });
+  REQUIRE(bench.run_until([&] { return is_found; }));
+  const auto text = [&] { return service->hosted()->types().find_service("test.lamp")->text; };
+  REQUIRE_THAT(text(), Catch::Matchers::Contains("int32 light"));
+  bench.replace_device(box_of_lamps("double"));
+  REQUIRE(bench.run_until([&] { return !upstream->is_open(); }));
+  REQUIRE(bench.wait_for(upstream->opened()).has_value());
+  REQUIRE(bench.run_until([&] {
+    const auto* known = upstream->types()->find_service("test.lamp");
+    return known && known->text == lamp_definition("double");
+  }));
+  const auto is_new = [&] {
+    const auto* offered = service->hosted()->types().find_service("test.lamp");
+    return offered && offered->text == lamp_definition("double");
+  };
+  CHECK(bench.run_until(is_new));
+  CHECK(upstream->is_open());
+  service->stop();
 }
