@@ -168,9 +168,11 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
     auto asked = still_there->shared_from_this();
     const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
     const auto* root = client ? (*client)->upstream()->object_type(service) : nullptr;
-    if (root) {
-      kept.push_back((*client)->upstream()->types());
-      services.push_back({service, root->qualified_name, kept.back().get()});
+    const auto types = client ? (*client)->upstream()->types() : nullptr;
+    const DescribedService described{service, root ? root->qualified_name : "", types.get()};
+    if (root && (is_definition(name) || fits_beside(described, services))) {
+      kept.push_back(types);
+      services.push_back(described);
     } else {
       unavailable.push_back(service);
     }
@@ -187,7 +189,8 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
         response = with_etag(text_response(200, "text/plain; charset=utf-8", definition->text), writer.request());
   } else {
     const auto base = writer.request().arrival.prefix + "/api/v1/devices/" + rr::percent_encode(device_name);
-    response = with_etag(find_document(gateway, name, device_name, base, services, unavailable), writer.request());
+    response = find_document(gateway, name, device_name, base, services, unavailable);
+    if (response.status == 200) response = with_etag(std::move(response), writer.request());
   }
   co_await writer.send(response);
 }
