@@ -178,7 +178,8 @@ void TypeScriptEmitter::emit_enum(const ServiceDefinition& definition, const Enu
   }
   std::vector<std::string> names;
   for (const auto& value : item.values) names.push_back('"' + value.name + '"');
-  out_.line("export type " + value_names_.at(definition.name + '.' + item.name) + " = " + joined(names, " | ") + ";");
+  out_.line("export type " + value_names_.at(definition.name + '.' + item.name) + " = " +
+            (names.empty() ? "never" : joined(names, " | ")) + ";");
   out_.gap();
 }
 

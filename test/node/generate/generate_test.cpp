@@ -87,6 +87,15 @@ TEST_CASE("generate: what only compat mode takes becomes code all the same") {
              Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;"));
 }
 
+TEST_CASE("generate ts: an enum without values has no names") {
+  const Folder folder;
+  const auto file = folder.write("none.robdef", "service test.none\nstdver 0.10\nenum Mode\nend\n");
+  for (const auto& types : {folder.path("none.d.ts"), folder.path("none.ts")}) {
+    CHECK(run_command("generate", {"ts", "--compat", file, "-o", types}).code == exit_ok);
+    CHECK_THAT(folder.read(types.substr(types.rfind('/') + 1)), Contains("export type ModeName = never;\n"));
+  }
+}
+
 TEST_CASE("generate: mistakes") {
   const Folder folder;
   const auto bad = folder.write("bad.robdef", "service a\nstdver 0.10\nimport b\n");
