@@ -51,7 +51,9 @@ Result<LockedFile> LockedFile::open_once(const fs::path& path, int flags) {
       return make_error(ErrorCode::system_resource_permission_denied, path.string() + " is in use by another node");
     return file.failure("lock");
   }
-  ::fchmod(descriptor, 0640);  // whatever the umask says: the group of a public node reads it
+  // Whatever the umask says: the group of a public node reads it, and who deletes old files from /tmp leaves one with
+  // a sticky bit alone (systemd-tmpfiles; XDG base directories).
+  ::fchmod(descriptor, 01640);
   return file;
 }
 

@@ -15,7 +15,7 @@ namespace rr {
 /// process opens and closes the file elsewhere.
 class LockedFile {
  public:
-  /// Opens or creates it, mode 0640, and locks it. Its content stays as it is.
+  /// Opens or creates it, mode 01640, and locks it. Its content stays as it is.
   /// Errors   system_resource_permission_denied: another node holds it; system_resource_error: it can't be opened.
   [[nodiscard]] static Result<LockedFile> open(const std::filesystem::path& path);
   /// The same for a file that is there. Errors   also system_resource_error: it is not, or is removed meanwhile.

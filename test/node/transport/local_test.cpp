@@ -202,8 +202,8 @@ TEST_CASE("public nodes are for those whom the administrator lets in") {
     return status.st_mode & 07777;
   };
   for (const auto* folder : {"by-nodeid", "by-nodename", "socket"}) CHECK(mode_of(base / folder) == 02750);
-  CHECK(mode_of(base / "by-nodename" / "test.node.info") == 0640);
-  CHECK(mode_of(base / "by-nodename" / "test.node.pid") == 0640);
+  CHECK(mode_of(base / "by-nodename" / "test.node.info") == 01640);
+  CHECK(mode_of(base / "by-nodename" / "test.node.pid") == 01640);
   CHECK(mode_of(list_local_nodes(base).at(0).socket) == 0770);
   CHECK(list_local_nodes(*user_run_folder() / "transport" / "local").empty());
   CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
