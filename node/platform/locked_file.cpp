@@ -26,6 +26,19 @@ struct flock whole_file() {
 
 }  // namespace
 
+std::optional<Error> shortage(int reason, const fs::path& path) {
+  if (reason != EMFILE && reason != ENFILE && reason != ENOMEM) return std::nullopt;
+  return make_error(ErrorCode::out_of_system_resource,
+                    "open " + path.string() + ": " + std::generic_category().message(reason));
+}
+
+Result<int> open_to_read(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor < 0)
+    if (auto error = shortage(errno, path)) return std::move(*error);
+  return descriptor;
+}
+
 Result<LockedFile> LockedFile::open(const fs::path& path) {
   for (int attempts = 10; attempts > 0; --attempts) {
     auto file = open_once(path, O_CREAT);
@@ -65,13 +78,14 @@ bool LockedFile::is_still_there() const {
          mine.st_ino == named.st_ino;
 }
 
-bool LockedFile::is_held(const fs::path& path) {
+Result<bool> LockedFile::is_held(const fs::path& path) {
   // To read only: other users' nodes let no more, and who watches the folder would take our closing for news.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) return false;
+  const auto descriptor = open_to_read(path);
+  if (!descriptor) return descriptor.error();
+  if (*descriptor < 0) return false;
   auto lock = whole_file();
-  const bool is_known = ::fcntl(descriptor, F_OFD_GETLK, &lock) == 0;
-  ::close(descriptor);
+  const bool is_known = ::fcntl(*descriptor, F_OFD_GETLK, &lock) == 0;
+  ::close(*descriptor);
   return is_known && lock.l_type != F_UNLCK;
 }
 

@@ -11,6 +11,13 @@
 
 namespace rr {
 
+/// Opens a file that anybody may have put there: a pipe doesn't make us wait, a link doesn't lead elsewhere. -1: it
+/// can't be opened, as when it is not there. Errors   out_of_system_resource: there is no descriptor or memory left for
+/// it.
+[[nodiscard]] Result<int> open_to_read(const std::filesystem::path& path);
+/// out_of_system_resource where that is what `reason`, an errno, says of `path`.
+[[nodiscard]] std::optional<Error> shortage(int reason, const std::filesystem::path& path);
+
 /// Held by a record lock of the open file, which excludes the reference's locks and, unlike those, survives that this
 /// process opens and closes the file elsewhere.
 class LockedFile {
@@ -20,8 +27,8 @@ class LockedFile {
   [[nodiscard]] static Result<LockedFile> open(const std::filesystem::path& path);
   /// The same for a file that is there. Errors   also system_resource_error: it is not, or is removed meanwhile.
   [[nodiscard]] static Result<LockedFile> open_left_behind(const std::filesystem::path& path);
-  /// Whether somebody holds the lock of a file. Not there: no.
-  static bool is_held(const std::filesystem::path& path);
+  /// Whether somebody holds the lock of a file. Not there: no. Errors   those of open_to_read().
+  [[nodiscard]] static Result<bool> is_held(const std::filesystem::path& path);
 
   LockedFile(LockedFile&& other) noexcept
       : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)) {}

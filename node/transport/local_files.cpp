@@ -44,20 +44,26 @@ std::map<std::string, std::string, std::less<>> parse_lines(std::string_view tex
   return values;
 }
 
-std::optional<LocalNodeInfo> read_info(const fs::path& file) {
-  // Another user may have put anything there: a pipe must not make us wait, a link not lead elsewhere.
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) return std::nullopt;
+/// What is no such file is none. Errors   those of open_to_read().
+Result<std::optional<LocalNodeInfo>> try_read_info(const fs::path& file) {
+  const std::optional<LocalNodeInfo> none;
+  const auto descriptor = open_to_read(file);
+  if (!descriptor) return descriptor.error();
+  if (*descriptor < 0) return none;
   struct stat status {};
   std::string text(max_info_size, '\0');
-  const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
-  const auto size = is_file ? ::read(descriptor, text.data(), text.size()) : -1;
-  ::close(descriptor);
-  if (size < 0) return std::nullopt;
+  const bool is_file = ::fstat(*descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  const auto size = is_file ? ::read(*descriptor, text.data(), text.size()) : -1;
+  ::close(*descriptor);
+  if (size < 0) return none;
   text.resize(static_cast<std::size_t>(size));
   auto info = parse_local_info(text);
-  if (!info) return std::nullopt;
-  return std::move(*info);
+  return info ? std::optional(std::move(*info)) : none;
+}
+
+std::optional<LocalNodeInfo> read_info(const fs::path& file) {
+  auto info = try_read_info(file);
+  return info ? std::move(*info) : std::nullopt;
 }
 
 fs::path by_id(const fs::path& base, const NodeId& id, const char* extension) {
@@ -151,6 +157,7 @@ Result<std::vector<LocalBase>> all_local_bases() {
     std::error_code unreadable;
     if (entry->is_directory(unreadable)) bases.push_back({entry->path(), entry->path().filename().string()});
   }
+  if (auto failure = shortage(error.value(), *publics)) return std::move(*failure);
   return bases;
 }
 
@@ -185,18 +192,22 @@ std::optional<LocalNodeInfo> find_local_node(const fs::path& base, const Connect
   return info;
 }
 
-std::vector<LocalNodeInfo> list_local_nodes(const fs::path& base) {
+Result<std::vector<LocalNodeInfo>> list_local_nodes(const fs::path& base) {
   std::vector<LocalNodeInfo> nodes;
   std::error_code error;
   std::size_t seen = 0;
   for (fs::directory_iterator entry(base / "by-nodeid", error), end; !error && entry != end; entry.increment(error)) {
     if (entry->path().extension() != ".info") continue;
     if (++seen > max_nodes) break;
-    auto info = read_info(entry->path());
-    if (!info || entry->path() != by_id(base, info->node.id, ".info")) continue;
+    auto info = try_read_info(entry->path());
+    if (!info) return info.error();
+    if (!*info || entry->path() != by_id(base, (*info)->node.id, ".info")) continue;
     // The reference's own info files lose their locks while it runs; its pid files don't.
-    if (LockedFile::is_held(by_id(base, info->node.id, ".pid"))) nodes.push_back(std::move(*info));
+    const auto is_held = LockedFile::is_held(by_id(base, (*info)->node.id, ".pid"));
+    if (!is_held) return is_held.error();
+    if (*is_held) nodes.push_back(std::move(**info));
   }
+  if (auto failure = shortage(error.value(), base)) return std::move(*failure);
   return nodes;
 }
 

@@ -50,7 +50,8 @@ class LocalNodeFiles {
 /// What a base says of the node that `url` names; nullopt when it doesn't know it.
 std::optional<LocalNodeInfo> find_local_node(const std::filesystem::path& base, const ConnectionUrl& url);
 /// All nodes that a base knows and that run; of very many, some.
-std::vector<LocalNodeInfo> list_local_nodes(const std::filesystem::path& base);
+/// Errors   out_of_system_resource: there is no descriptor or memory left for looking.
+[[nodiscard]] Result<std::vector<LocalNodeInfo>> list_local_nodes(const std::filesystem::path& base);
 
 /// One place where nodes of this machine leave their info files.
 struct LocalBase {
@@ -58,7 +59,7 @@ struct LocalBase {
   std::string user;  ///< whose public base it is; empty: this user's own
 };
 /// This user's, and the public ones of all users, which may be none yet.
-/// Errors   those of system_run_folder() and user_run_folder().
+/// Errors   those of system_run_folder() and user_run_folder(); out_of_system_resource, likewise.
 [[nodiscard]] Result<std::vector<LocalBase>> all_local_bases();
 /// The folder in which a public base has a folder for each user.
 [[nodiscard]] Result<std::filesystem::path> public_bases_folder();

@@ -64,14 +64,17 @@ Result<std::vector<LocalNode>> list_local_nodes() {
   const auto bases = all_local_bases();
   if (!bases) return bases.error();
   std::vector<LocalNode> nodes;
-  for (const auto& base : *bases)
-    for (auto& info : list_local_nodes(base.path)) {
+  for (const auto& base : *bases) {
+    auto infos = list_local_nodes(base.path);
+    if (!infos) return infos.error();
+    for (auto& info : *infos) {
       if (!base.user.empty() && info.username != base.user) continue;
       const auto host = base.user.empty() ? std::string() : base.user + "@localhost";
       auto url = "rr+local://" + host + "/?nodeid=" + format_node_id(info.node.id, NodeIdFormat::dashes) +
                  "&service=" + std::string(service_index_name);
       nodes.push_back({std::move(info), std::move(url)});
     }
+  }
   return nodes;
 }
 
@@ -149,6 +152,8 @@ awaitable<void> LocalWatch::run(std::shared_ptr<State> state) {
     else if (problem != state->problem)
       state->on_problem(problem);
     state->problem = problem;
+    // The news that this look was for are still to be seen.
+    if (!nodes && nodes.error().code == ErrorCode::out_of_system_resource) state->timer.hear_news();
     co_await state->timer.wait();
   }
 }

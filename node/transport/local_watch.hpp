@@ -21,12 +21,12 @@ struct LocalNode {
 };
 
 /// This user's nodes and the public ones of all users.
-/// Errors   those of all_local_bases().
+/// Errors   those of all_local_bases() and of a base's list.
 [[nodiscard]] Result<std::vector<LocalNode>> list_local_nodes();
 
 /// Hands the list of nodes to `on_nodes`: soon, shortly after files have changed or a node has let go of them, and
-/// every `refresh`. What the system does not tell, or tells of too many folders, the refresh sees. For the executor's
-/// thread.
+/// every `refresh`; where the list can't be made, none, and `on_problem` hears why. What the system does not tell, or
+/// tells of too many folders, the refresh sees. For the executor's thread.
 class LocalWatch {
  public:
   using OnNodes = std::function<void(const std::vector<LocalNode>&)>;

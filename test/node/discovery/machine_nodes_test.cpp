@@ -1,5 +1,6 @@
 // Nodes that are found without packets: through the file system, and where the system shows devices.
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -147,6 +148,29 @@ TEST_CASE("a node that is killed is gone at once, though its files stay") {
   node.kill();
   CHECK(watcher.next(who.id) == "lost");
   CHECK(fs::exists(base / "by-nodeid" / (format_node_id(who.id, NodeIdFormat::dashes) + ".info")));
+}
+
+TEST_CASE("a process that runs out of file descriptors loses no nodes, and sees later which are gone") {
+  const Sandbox sandbox;
+  Watcher watcher;
+  // No node on a thread of its own, which might close a descriptor meanwhile.
+  const NodeIdentity node{random_node_id(), "test.node"};
+  const auto base = make_local_folders().value().base;
+  std::optional files(LocalNodeFiles::take(base, node).value());
+  REQUIRE(files->publish({node, "/a.sock", user_name(), "nonce"}).has_value());
+  CHECK(watcher.next(node.id) == local_url(node.id));
+  files.reset();
+  const int free_number = ::dup(0);
+  ::close(free_number);
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_NOFILE, &before) == 0);
+  const rlimit few{static_cast<rlim_t>(free_number), before.rlim_max};
+  ::setrlimit(RLIMIT_NOFILE, &few);
+  for (int i = 0; i < 100 && watcher.problems.empty(); ++i) watcher.run_for(milliseconds(50));
+  CHECK(watcher.events.empty());
+  CHECK(watcher.problems.size() == 1);
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  CHECK(watcher.next(node.id) == "lost");
 }
 
 TEST_CASE("services of local nodes are found by type, nodes by name and ID") {

@@ -1,6 +1,7 @@
 // Nodes of one machine: files, locks, look-up, and calls over rr+local.
 #include "node/transport/local.hpp"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -58,7 +59,7 @@ TEST_CASE("a node is reached by name, by ID and by both, and leaves nothing behi
     CHECK(add_at("rr+local:///?" + by_id + "&nodename=test.node&service=Sum") == 3.75);
     CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
 
-    const auto nodes = list_local_nodes(base);
+    const auto nodes = list_local_nodes(base).value();
     REQUIRE(nodes.size() == 1);
     CHECK(nodes[0].node.id == id);
     CHECK(nodes[0].node.name == "test.node");
@@ -85,7 +86,7 @@ TEST_CASE("what a crashed node left is cleaned up, and a running one is left alo
   write_file(folders.base / "by-nodeid" / (stem + ".info"), format_local_info(dead));
   write_file(folders.base / "by-nodeid" / (stem + ".pid"), "3039530421");
   write_file(dead.socket, "");
-  CHECK(list_local_nodes(folders.base).empty());
+  CHECK(list_local_nodes(folders.base).value().empty());
   const auto error = error_of([&] { connect("rr+local:///?nodeid=" + stem + "&service=Sum"); });
   CHECK(error.code == ErrorCode::connection_error);
   CHECK_THAT(error.message, Contains(dead.socket));
@@ -101,7 +102,7 @@ TEST_CASE("a socket that answers for another node is found out") {
   const Sandbox sandbox;
   RunningNode node(add_adder);
   const auto folders = make_local_folders().value();
-  auto info = list_local_nodes(folders.base).at(0);
+  auto info = list_local_nodes(folders.base).value().at(0);
   info.node = {random_node_id(), "wanted.node"};
   write_file(folders.base / "by-nodename" / "wanted.node.info", format_local_info(info));
   CHECK(error_of([&] { connect("rr+local:///?nodename=wanted.node&service=Sum"); }).code == ErrorCode::node_not_found);
@@ -123,6 +124,32 @@ TEST_CASE("info files are read as the reference writes them") {
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: /a\0b.sock\n"sv).has_value());
 }
 
+TEST_CASE("a process without a file descriptor to spare doesn't take local nodes for gone") {
+  const Sandbox sandbox;
+  const auto base = make_local_folders().value().base;
+  // No node on a thread of its own, which might take the descriptor that is left, or close one.
+  const NodeIdentity node{random_node_id(), "test.node"};
+  auto files = LocalNodeFiles::take(base, node).value();
+  REQUIRE(files.publish({node, "/a.sock", user_name(), "nonce"}).has_value());
+  REQUIRE(list_local_nodes(base).value().size() == 1);
+  const int free_number = ::dup(0);
+  ::close(free_number);
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_NOFILE, &before) == 0);
+  for (const int left : {0, 1}) {  // one is enough for the folder, but not for a file
+    rlimit few{static_cast<rlim_t>(free_number + left), before.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &few);
+    const auto nodes = list_local_nodes(base);
+    const auto is_held = LockedFile::is_held(base / "by-nodename" / "test.node.pid");
+    ::setrlimit(RLIMIT_NOFILE, &before);
+    INFO(left);
+    REQUIRE_FALSE(nodes.has_value());
+    CHECK(nodes.error().code == ErrorCode::out_of_system_resource);
+    CHECK(is_held.has_value() == (left == 1));
+  }
+  CHECK(LockedFile::is_held(base / "by-nodename" / "test.node.pid").value());
+}
+
 TEST_CASE("a lock is of the file that the path names, whoever removes it meanwhile") {
   const Sandbox sandbox;
   const auto path = fs::path(sandbox.folder()) / "robot.pid";
@@ -138,7 +165,7 @@ TEST_CASE("a lock is of the file that the path names, whoever removes it meanwhi
     const auto mine = LockedFile::open(path);
     if (!mine) continue;
     ++taken;
-    if (!LockedFile::is_held(path)) ++lost;
+    if (!LockedFile::is_held(path).value()) ++lost;
   }
   is_over = true;
   other.join();
@@ -204,8 +231,8 @@ TEST_CASE("public nodes are for those whom the administrator lets in") {
   for (const auto* folder : {"by-nodeid", "by-nodename", "socket"}) CHECK(mode_of(base / folder) == 02750);
   CHECK(mode_of(base / "by-nodename" / "test.node.info") == 01640);
   CHECK(mode_of(base / "by-nodename" / "test.node.pid") == 01640);
-  CHECK(mode_of(list_local_nodes(base).at(0).socket) == 0770);
-  CHECK(list_local_nodes(*user_run_folder() / "transport" / "local").empty());
+  CHECK(mode_of(list_local_nodes(base).value().at(0).socket) == 0770);
+  CHECK(list_local_nodes(*user_run_folder() / "transport" / "local").value().empty());
   CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
   CHECK(add_at("rr+local:///?nodename=test.node&service=Sum") == 3.75);
 }
