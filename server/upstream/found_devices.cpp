@@ -105,14 +105,14 @@ void FoundDevices::handle(const rr::NodeEvent& event) {
   auto& node = nodes_[event.node.node_id];
   node.info = event.node;
   review(node);
-  // Only a node that will be asked needs to know when.
-  if (!node.verdict.urls_to_ask.empty())
-    node.refresh.handle_nonce(node.info.service_state_nonce, std::chrono::steady_clock::now());
   wake_.cancel();
 }
 
 void FoundDevices::review(Node& node) {
   node.verdict = judge(config_.discover.allow, node.info, node.services ? &*node.services : nullptr);
+  // Only a node that will be asked needs to know when.
+  if (!node.verdict.urls_to_ask.empty())
+    node.refresh.handle_nonce(node.info.service_state_nonce, std::chrono::steady_clock::now());
   auto& urls = node.verdict.device_urls;
   if (urls.empty() || devices_.find_configured(node.info.node_id)) return drop_device(node);
   if (const auto device = node.device.lock()) {

@@ -109,6 +109,15 @@ TEST_CASE("a rule by service type asks the node, and follows its services") {
   wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
 }
 
+TEST_CASE("a rule by service type that a reload adds asks the nodes that are known") {
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+  TestGateway gateway(0, allowing({}));
+  gateway.announce(at(id_of(node), node.port(), "test.node"));
+  wait_for_nodes(gateway, [](const json& all) { return all.size() == 1; });
+  gateway.reconfigure(allowing({{"", {}, "com.x.Arm"}}));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+}
+
 TEST_CASE("a lost node takes its device along; one that comes back has its name again") {
   rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
   TestGateway gateway(0, allowing({{"*", {}, ""}}));

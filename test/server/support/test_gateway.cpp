@@ -84,6 +84,16 @@ void TestGateway::withdraw(const rr::NodeId& node_id, const std::string& url) {
   asio::post(io_, [this, node_id, url] { gateway_->found()->discovery().handle_withdrawn(node_id, url); });
 }
 
+void TestGateway::reconfigure(const std::function<void(Config&)>& change) {
+  std::promise<rr::Result<>> done;
+  asio::post(io_, [&] {
+    auto next = gateway_->config();
+    change(next);
+    done.set_value(gateway_->reconfigure(std::move(next)));
+  });
+  done.get_future().get().value();
+}
+
 std::string TestGateway::wait_for_state(std::string_view state, std::size_t index) {
   return wait_for_device(index, [&](const auto& device) { return device["state"] == std::string(state); }).dump();
 }

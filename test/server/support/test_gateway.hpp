@@ -34,6 +34,8 @@ class TestGateway {
   /// The gateway, whose configuration has "discover", hears of a node; or hears that it has left a URL.
   void announce(const rr::Announcement& announcement);
   void withdraw(const rr::NodeId& node_id, const std::string& url);
+  /// Gateway::reconfigure, with the present configuration and what `change` makes of it.
+  void reconfigure(const std::function<void(Config&)>& change);
   /// Asks `path` until the answer is as wanted; returns it. Throws after 10 s.
   nlohmann::json wait_for(const std::string& path, const std::function<bool(const nlohmann::json&)>& is_wanted);
 
