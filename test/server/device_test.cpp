@@ -82,6 +82,31 @@ TEST_CASE("a device that hangs while it is dialed stops at once, for its clients
   CHECK(failure->code == rr::ErrorCode::operation_aborted);
 }
 
+TEST_CASE("found devices and pages follow what a reload says of all devices") {
+  boost::asio::io_context io{1};
+  Config config;
+  DeviceRegistry registry(io.get_executor(), config);
+  std::vector<const Device*> devices;
+  for (const bool is_found : {true, false}) {
+    DeviceConfig made;
+    made.name = is_found ? "found" : "page";
+    made.url = rr::parse_url("rr+tcp://127.0.0.1:1/?service=x").value();
+    made.is_found = is_found;
+    made.is_served = !is_found;
+    devices.push_back(&registry.add(std::move(made), nullptr));
+  }
+  config.timeouts.request = milliseconds(1234);
+  config.retry = {milliseconds(11), milliseconds(12), milliseconds(13)};
+  registry.replace(registry.prepare(config).value());
+  for (const auto* device : devices) {
+    REQUIRE(registry.has(*device));
+    CHECK(device->request_timeout() == milliseconds(1234));
+    CHECK(device->retry() == config.retry);
+  }
+  registry.stop();
+  io.run();
+}
+
 TEST_CASE("of the URLs of a found device the one that answers is taken, whichever hangs") {
   const Hanging hanging;
   rr::RunningNode node([](rr::Node&) {});
