@@ -274,8 +274,12 @@ rr::Result<> Gateway::reconfigure(Config next) {
   }
   if (before.recordings != config_.recordings) recordings_->follow_config();
   router_ = make_routes(*this);
-  // Clients of a found device that is gone stay as long as it lets them.
-  const auto is_still_there = [this](const Device& device) { return device.config().is_found || devices_.has(device); };
+  // Clients of a found device that is gone stay as long as it lets them, unless a configured one has its name.
+  const auto is_still_there = [this](const Device& device) {
+    if (!device.config().is_found) return devices_.has(device);
+    const auto* now = devices_.find(device.config().name);
+    return !now || now->config().is_found;
+  };
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
     if (connection.device && !is_still_there(*connection.device))

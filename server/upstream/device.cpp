@@ -357,7 +357,7 @@ void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
   for (const auto& device : before) {
     if (has(*device)) continue;
     const auto& config = device->config();
-    if (config.is_found || (config.is_served && !find(config.name))) {
+    if ((config.is_found || config.is_served) && !find(config.name)) {
       device->become(config, config_);
       devices_.push_back(device);
     } else {

@@ -187,8 +187,8 @@ class DeviceRegistry {
   /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
   /// ones. Errors   as load_tls(); nothing has changed.
   [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
-  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay, and pages whose names
-  /// no other device has now.
+  /// Takes what prepare() made, once the configuration has been replaced. Found devices and pages stay
+  /// whose names no other device has now.
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
   /// See Device::begin_closing().

@@ -58,7 +58,7 @@ FoundDevices::FoundDevices(asio::io_context& io, const Config& config, DeviceReg
 void FoundDevices::reload_tls(bool is_forced) {
   if (!(is_forced || tls_->has_changed()) || !tls_->reload()) return;
   for (const auto& [id, node] : nodes_)
-    if (const auto device = node.device.lock()) device->note_trouble();  // it may be reached now
+    if (node.device) node.device->note_trouble();  // it may be reached now
 }
 
 void FoundDevices::start() {
@@ -83,7 +83,7 @@ void FoundDevices::note_change(const Discover& before, std::shared_ptr<TlsFiles>
     if (tls) tls_ = std::move(tls);
     if (now.is_enabled) listen();
   }
-  next_review_ = {};
+  for (auto& [id, node] : nodes_) review(node);
   wake_.cancel();
 }
 
@@ -109,15 +109,16 @@ void FoundDevices::handle(const rr::NodeEvent& event) {
 }
 
 void FoundDevices::review(Node& node) {
+  if (node.device && !devices_.has(*node.device)) drop_device(node);  // a configured one has its name now
   node.verdict = judge(config_.discover.allow, node.info, node.services ? &*node.services : nullptr);
   // Only a node that will be asked needs to know when.
   if (!node.verdict.urls_to_ask.empty())
     node.refresh.handle_nonce(node.info.service_state_nonce, std::chrono::steady_clock::now());
   auto& urls = node.verdict.device_urls;
   if (urls.empty() || devices_.find_configured(node.info.node_id)) return drop_device(node);
-  if (const auto device = node.device.lock()) {
-    if (device->state() == DeviceState::online && discovery_) discovery_->confirm(node.info.node_id);
-    return device->set_urls(urls);
+  if (node.device) {
+    if (node.device->state() == DeviceState::online && discovery_) discovery_->confirm(node.info.node_id);
+    return node.device->set_urls(urls);
   }
   if (device_count_ >= config_.discover.max_devices) {
     if (!std::exchange(is_full_, true))
@@ -131,18 +132,16 @@ void FoundDevices::review(Node& node) {
   made.mode = config_.discover.mode;
   log(LogLevel::info, "device found",
       {{"device", made.name}, {"node_id", id_text(node.info.node_id)}, {"url", rr::format_url(made.url)}});
-  auto& device = devices_.add(std::move(made), tls_);
-  device.set_urls(urls);
-  node.device = device.weak_from_this();
+  node.device = devices_.add(std::move(made), tls_).shared_from_this();
+  node.device->set_urls(urls);
   ++device_count_;
 }
 
 void FoundDevices::drop_device(Node& node) {
-  const auto device = node.device.lock();
-  if (!device) return;
+  if (!node.device) return;
   log(LogLevel::info, "found device gone",
-      {{"device", device->config().name}, {"node_id", id_text(node.info.node_id)}});
-  devices_.remove(*device);
+      {{"device", node.device->config().name}, {"node_id", id_text(node.info.node_id)}});
+  devices_.remove(*node.device);
   node.device.reset();
   --device_count_;
   is_full_ = false;
@@ -223,7 +222,7 @@ std::vector<FoundDevices::Entry> FoundDevices::list() const {
     if (const auto node = nodes_.find(info.node_id); node != nodes_.end()) {
       entry.is_allowed = node->second.verdict.is_allowed;
       entry.services = node->second.services;
-      entry.device = node->second.device.lock().get();  // the registry keeps it
+      entry.device = node->second.device.get();
     }
     if (!entry.device) entry.device = devices_.find_configured(info.node_id);
     entry.node = std::move(info);

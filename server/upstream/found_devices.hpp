@@ -56,7 +56,7 @@ class FoundDevices {
     Verdict verdict;
     rr::ServiceRefresh refresh;
     std::optional<std::vector<rr::ServiceInfo>> services;
-    std::weak_ptr<Device> device;  ///< that was made of it
+    std::shared_ptr<Device> device;  ///< that was made of it; null: none
   };
 
   void listen();

@@ -159,6 +159,32 @@ TEST_CASE("a configured device is not found a second time, and names stay unique
     if (node["node_name"] == "node.x") CHECK(node["device"] == "x");
 }
 
+TEST_CASE("a found device whose name a reload gives to a configured one has another name at once") {
+  for (const auto mode : {DeviceMode::relay, DeviceMode::shared}) {
+    rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+    TestGateway gateway(1, [&](Config& config) {
+      allowing({{"*", {}, ""}})(config);
+      config.discover.mode = mode;
+    });
+    gateway.announce(at(id_of(node), node.port(), "test.node"));
+    wait_for_devices(gateway, [](const json& all) { return all.size() == 2 && all[1]["state"] == "online"; });
+    const auto url = "rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=test.node&service=thing";
+    auto thing = rr::connect(url);
+    CHECK(thing.get("one").to<std::int32_t>().value() == 1);
+    gateway.reconfigure([&](Config& config) {
+      config.devices[0].name = "test.node";
+      config.devices[0].mode = mode;
+    });
+    auto devices = wait_for_devices(gateway, [](const json&) { return true; });
+    REQUIRE(devices.size() == 2);
+    CHECK(devices[0]["name"] == "test.node");
+    CHECK(devices[0]["found"] == false);
+    CHECK(devices[1]["name"] == "test.node-" + rr::format_node_id(id_of(node), rr::NodeIdFormat::dashes).substr(0, 8));
+    CHECK_THROWS(thing.get("one"));
+    wait_for_devices(gateway, [](const json& all) { return all.size() == 2 && all[1]["state"] == "online"; });
+  }
+}
+
 TEST_CASE("found devices are relayed or shared, as discovery is configured") {
   for (const auto mode : {DeviceMode::relay, DeviceMode::shared}) {
     rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
