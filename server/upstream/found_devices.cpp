@@ -77,13 +77,16 @@ void FoundDevices::note_change(const Discover& before, std::shared_ptr<TlsFiles>
   other_rules.allow = now.allow;
   other_rules.max_devices = now.max_devices;
   if (now != other_rules) {
-    for (auto& [id, node] : nodes_) drop_device(node);
-    nodes_.clear();
+    const bool makes_others = now.is_enabled != before.is_enabled || now.mode != before.mode || now.tls != before.tls;
+    for (auto& [id, node] : nodes_) {
+      node.is_lost = true;
+      if (makes_others) drop_device(node);
+    }
     discovery_.reset();
-    if (tls) tls_ = std::move(tls);
+    if (makes_others && tls) tls_ = std::move(tls);
     if (now.is_enabled) listen();
   }
-  for (auto& [id, node] : nodes_) review(node);
+  review_all();
   wake_.cancel();
 }
 
@@ -97,12 +100,14 @@ void FoundDevices::stop() {
 void FoundDevices::handle(const rr::NodeEvent& event) {
   if (event.kind == rr::NodeEvent::Kind::lost) {
     if (const auto lost = nodes_.find(event.node.node_id); lost != nodes_.end()) {
-      drop_device(lost->second);
-      nodes_.erase(lost);
+      lost->second.is_lost = true;
+      review(lost->second);
+      if (!lost->second.device) nodes_.erase(lost);
     }
     return;
   }
   auto& node = nodes_[event.node.node_id];
+  node.is_lost = false;
   node.info = event.node;
   review(node);
   wake_.cancel();
@@ -115,7 +120,9 @@ void FoundDevices::review(Node& node) {
   if (!node.verdict.urls_to_ask.empty())
     node.refresh.handle_nonce(node.info.service_state_nonce, std::chrono::steady_clock::now());
   auto& urls = node.verdict.device_urls;
-  if (urls.empty() || devices_.find_configured(node.info.node_id)) return drop_device(node);
+  const bool is_used = node.device && node.device->state() == DeviceState::online && node.device->clients() > 0;
+  if ((node.is_lost && !is_used) || urls.empty() || devices_.find_configured(node.info.node_id))
+    return drop_device(node);
   if (node.device) {
     if (node.device->state() == DeviceState::online && discovery_) discovery_->confirm(node.info.node_id);
     return node.device->set_urls(urls);
@@ -135,6 +142,11 @@ void FoundDevices::review(Node& node) {
   node.device = devices_.add(std::move(made), tls_).shared_from_this();
   node.device->set_urls(urls);
   ++device_count_;
+}
+
+void FoundDevices::review_all() {
+  for (auto& [id, node] : nodes_) review(node);
+  std::erase_if(nodes_, [](const auto& each) { return each.second.is_lost && !each.second.device; });
 }
 
 void FoundDevices::drop_device(Node& node) {
@@ -162,10 +174,11 @@ rr::awaitable<void> FoundDevices::run() {
     co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
     if (is_stopping_) break;
     const auto now = std::chrono::steady_clock::now();
-    const bool reviews = now >= next_review_;
-    if (reviews) next_review_ = now + review_period;
+    if (now >= next_review_) {
+      next_review_ = now + review_period;
+      review_all();
+    }
     for (auto& [id, node] : nodes_) {
-      if (reviews) review(node);
       if (node.verdict.urls_to_ask.empty() || questions_.size() >= max_open_questions || !node.refresh.take_due(now))
         continue;
       begin_question(id, node.verdict.urls_to_ask);

@@ -20,7 +20,8 @@
 namespace rrgate {
 
 /// Listens for nodes, asks those for their services that a rule wants to know of, and keeps the devices of the registry
-/// that were found. A found device goes when its node is not announced any more, or no rule allows it any more.
+/// that were found. A found device goes when no rule allows its node any more; or when the node is not announced any
+/// more, and the device does not answer or nobody uses it.
 class FoundDevices {
  public:
   /// The CAs that found devices are checked against. See TlsFiles.
@@ -35,7 +36,7 @@ class FoundDevices {
   void start();
   void stop();
   /// The configuration has been replaced; `before` was its part. Where more than the rules differs, all nodes are
-  /// forgotten, and heard of anew.
+  /// lost, and heard of anew; where devices would be made in another way, these are forgotten.
   /// `tls`  as load_tls() made it; null where discovery is off.
   void note_change(const Discover& before, std::shared_ptr<TlsFiles> tls);
 
@@ -57,11 +58,14 @@ class FoundDevices {
     rr::ServiceRefresh refresh;
     std::optional<std::vector<rr::ServiceInfo>> services;
     std::shared_ptr<Device> device;  ///< that was made of it; null: none
+    bool is_lost = false;            ///< not announced any more: there as long as its device answers and has clients
   };
 
   void listen();
   void handle(const rr::NodeEvent& event);
   void review(Node& node);
+  /// The same for all, and forgets those that are lost.
+  void review_all();
   void drop_device(Node& node);
   std::string free_name(const rr::NodeDiscoveryInfo& node) const;
   /// Asks nodes when their time has come, and reviews all: a device that was configured may prove to be one of them.

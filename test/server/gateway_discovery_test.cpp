@@ -229,15 +229,48 @@ TEST_CASE("a flood of nodes makes no more devices than may be") {
   CHECK(wait_for_devices(gateway, [](const json&) { return true; }).size() == 3);
 }
 
-TEST_CASE("a client stays connected to a found device whose announcements end") {
-  TestGateway gateway(1, allowing({{"*", {}, ""}}));
-  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
-  const auto news = at(id_of(node), node.port(), "test.node");
-  gateway.announce(news);
-  wait_for_devices(gateway, [](const json& all) { return all.size() == 2 && all[1]["state"] == "online"; });
+TEST_CASE("a found device whose announcements end stays while it answers and has clients") {
+  for (const auto mode : {DeviceMode::relay, DeviceMode::shared})
+    for (const bool client_leaves : {true, false}) {
+      TestGateway gateway(0, [&](Config& config) {
+        allowing({{"*", {}, ""}})(config);
+        config.discover.mode = mode;
+      });
+      auto node = std::make_optional<rr::RunningNode>([](rr::Node& made) { made.add(make_thing()); });
+      const auto news = at(id_of(*node), node->port(), "test.node");
+      gateway.announce(news);
+      wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+      std::optional thing(
+          rr::connect("rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=test.node&service=thing"));
+      gateway.withdraw(news.node_id, news.url);
+      wait_for_nodes(gateway, [](const json& all) { return all.empty(); });
+      CHECK(wait_for_devices(gateway, [](const json&) { return true; }).size() == 1);
+      CHECK(thing->get("one").to<std::int32_t>().value() == 1);
+      if (client_leaves)
+        thing.reset();
+      else
+        node.reset();
+      wait_for_devices(gateway, [](const json& all) { return all.empty(); });
+    }
+}
+
+TEST_CASE("a reload of where nodes are found keeps the found devices that clients use") {
+  rr::RunningNode used([](rr::Node& made) { made.add(make_thing()); });
+  TestGateway gateway(0, [&](Config& config) {
+    allowing({{"", id_of(used), ""}, {"", rr::NodeId{{7}}, ""}})(config);
+    config.discover.mode = DeviceMode::shared;
+  });
+  gateway.announce(at(id_of(used), used.port(), "test.node"));
+  gateway.announce(at(rr::NodeId{{7}}, 1, "other.node"));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 2; });
   auto thing =
       rr::connect("rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=test.node&service=thing");
-  gateway.withdraw(news.node_id, news.url);
-  wait_for_devices(gateway, [](const json& all) { return all.size() == 1; });
+  gateway.reconfigure([](Config& config) { config.discover.scopes = {"node_local"}; });
+  const auto devices = wait_for_devices(gateway, [](const json&) { return true; });
+  REQUIRE(devices.size() == 1);
+  CHECK(devices[0]["name"] == "test.node");
   CHECK(thing.get("one").to<std::int32_t>().value() == 1);
+  gateway.reconfigure([](Config& config) { config.discover.allow.clear(); });
+  CHECK(wait_for_devices(gateway, [](const json&) { return true; }).empty());
+  CHECK_THROWS(thing.get("one"));
 }
