@@ -115,7 +115,9 @@ TEST_CASE("a rule by service type that a reload adds asks the nodes that are kno
   gateway.announce(at(id_of(node), node.port(), "test.node"));
   wait_for_nodes(gateway, [](const json& all) { return all.size() == 1; });
   gateway.reconfigure(allowing({{"", {}, "com.x.Arm"}}));
-  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+  const auto devices =
+      wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+  CHECK(devices[0]["name"] == "test.node");
 }
 
 TEST_CASE("a lost node takes its device along; one that comes back has its name again") {
