@@ -125,9 +125,10 @@ rr::OrderedJson McpTools::list() {
   return out;
 }
 
-/// Throws   rr::Exception: an argument that the tool does not have. What is misspelt must not be left out unheard.
-void expect_known(const Tool& tool, const rr::Json& arguments) {
-  const auto known = rr::OrderedJson::parse(tool.definition)["inputSchema"]["properties"];
+/// `definition`  of a tool. Throws   rr::Exception: an argument that it does not have. What is misspelt must not be
+/// left out unheard.
+void expect_known(std::string_view definition, const rr::Json& arguments) {
+  const auto known = rr::OrderedJson::parse(definition)["inputSchema"]["properties"];
   for (const auto& [name, value] : arguments.items())
     if (!known.contains(name)) refuse(rr::ErrorCode::invalid_argument, "the tool has no argument " + rr::quote(name));
 }
@@ -144,7 +145,7 @@ rr::awaitable<std::optional<rr::OrderedJson>> McpTools::call(const std::string& 
   std::optional<rr::Error> error;
   rr::OrderedJson result;
   try {
-    expect_known(*tool, arguments);
+    expect_known(tool->definition, arguments);
     auto request = std::make_shared<const JsonRequest>(value_or_throw(JsonRequest::from_json(arguments)));
     result = co_await (this->*tool->perform)(std::move(request));
   } catch (const rr::Exception& exception) {

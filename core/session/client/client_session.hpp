@@ -56,12 +56,9 @@ struct Connected {
 };
 /// A request ended. What the value is depends on the request (see ClientSession).
 struct Completed {
-  Completed(RequestId of, Result<Value> with, bool cannot_be_read = false)
-      : id(of), is_unread(cannot_be_read), result(std::move(with)) {}
-
-  RequestId id;
-  bool is_unread;  ///< an error: the service has answered, and that can't be read
+  RequestId id = 0;
   Result<Value> result;
+  bool is_unread = false;  ///< an error: the service has answered, and that can't be read
 };
 struct EventReceived {
   std::string path;
