@@ -131,6 +131,11 @@ bool LeaseTable::has_at(LockClient client, std::string_view path) const {
   return lost_.contains({client, key}) || (lease != leases_.end() && lease->second.holder == client);
 }
 
+bool LeaseTable::is_held(std::string_view path) const {
+  return std::any_of(leases_.begin(), leases_.end(),
+                     [key = canonical_lock_path(path)](const auto& lease) { return rr::is_within(key, lease.first); });
+}
+
 void LeaseTable::handle_gone(LockClient client) {
   for (auto it = leases_.begin(); it != leases_.end();) {
     const auto at = it++;

@@ -52,6 +52,8 @@ class LeaseTable {
 
   /// Whether a client has the lease of this object, or has lost it and not released it.
   bool has_at(LockClient client, std::string_view path) const;
+  /// Whether anybody has a lease that covers the object.
+  bool is_held(std::string_view path) const;
 
   // --- told ---
 

@@ -66,7 +66,15 @@ SafeValues::SafeValues(std::string device, std::string_view service, const std::
   }
 }
 
+SafeValues::~SafeValues() {
+  for (const auto& path : owed_)
+    log(LogLevel::warning, "the device was not made safe: it was away, and the gateway stops or leaves it",
+        {{"device", device_}, {"path", path}});
+}
+
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
+  for (auto& item : items_) item.is_checked = false;
+  handle_lost(upstream->number());  // its session before this one may have been closed while it rested
   for (std::size_t i = 0; i < items_.size(); ++i) look_up(i, upstream);
   pay(upstream);
 }
@@ -78,14 +86,18 @@ void SafeValues::check_again(std::string_view path, const std::shared_ptr<Upstre
 
 void SafeValues::look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream) {
   auto& item = items_[index];
-  if (upstream->object_type(item.action.path)) return read(item, *upstream);
+  if (upstream->object_type(item.action.path)) {
+    item.is_checked = true;
+    return read(item, *upstream);
+  }
   auto looked_up = [weak = weak_from_this(), index, upstream](const rr::Result<rr::Value>& found) {
     const auto self = weak.lock();
     if (!self) return;
     auto& wanted = self->items_[index];
+    wanted.is_checked = true;
     if (found)
       self->read(wanted, *upstream);
-    else if (upstream->is_open() && !(wanted.request && is_refusal(found.error())))
+    else if (!upstream->is_lost() && !(wanted.request && is_refusal(found.error())))
       self->take(wanted, misfit(wanted.action, found.error().message));
     self->pay(upstream);
   };
@@ -117,9 +129,22 @@ bool SafeValues::has(std::string_view path) const {
                      [&](const Item& item) { return rr::is_within(item.action.path, path); });
 }
 
-/// What was owed when the session was lost: first what could be checked, then, as objects are found, the rest.
+bool SafeValues::is_checked(std::string_view path) const {
+  return std::all_of(items_.begin(), items_.end(),
+                     [&](const Item& item) { return item.is_checked || !rr::is_within(item.action.path, path); });
+}
+
+/// What was owed when the session was lost: first what has been looked at, then, as objects are found, the rest.
 void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
-  const auto is_due = [this](const std::string& path) { return check(path).has_value(); };
+  pay_due(upstream, [this](const std::string& path) { return is_checked(path); });
+}
+
+void SafeValues::pay_around(std::string_view path, const std::shared_ptr<Upstream>& upstream) {
+  pay_due(upstream, [&](const std::string& owed) { return rr::is_within(owed, path) || rr::is_within(path, owed); });
+}
+
+void SafeValues::pay_due(const std::shared_ptr<Upstream>& upstream,
+                         const std::function<bool(const std::string&)>& is_due) {
   std::vector<std::string> due;
   std::copy_if(owed_.begin(), owed_.end(), std::back_inserter(due), is_due);
   std::erase_if(owed_, is_due);
@@ -129,27 +154,40 @@ void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
           {{"device", device_}, {"path", path}});
 }
 
+void SafeValues::handle_lost(std::uint64_t upstream) {
+  std::vector<std::string> lost;
+  for (const auto& doubt : doubts_)
+    if (doubt.upstream == upstream) lost.push_back(doubt.path);
+  std::erase_if(doubts_, [&](const Doubt& doubt) { return doubt.upstream == upstream; });
+  for (const auto& path : lost) owe_again(path);
+}
+
+void SafeValues::owe_again(const std::string& path) {
+  if (!is_leased_ || !is_leased_(path)) send(path, nullptr);
+}
+
 bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by) {
-  if (!by || !by->is_open()) {
+  if (!by || by->is_lost()) {
     if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
     if (on_owed_) on_owed_();
     return false;
   }
   by->forget_commands(path);
+  std::erase_if(doubts_, [&](const Doubt& doubt) { return rr::is_within(doubt.path, path); });
   for (const auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.last) continue;
-    by->make_safe(*item.last,
-                  [weak = weak_from_this(), path, by, action = item.action](const rr::Result<rr::Value>& result) {
-                    const auto self = weak.lock();
-                    if (result || !self) return;
-                    log(LogLevel::error, "the device did not take a safe value",
-                        {{"device", self->device_},
-                         {"member", action.path + "." + action.member},
-                         {"error", result.error().message}});
-                    if (!by->is_open()) self->send(path, nullptr);  // again, once it is back
-                  });
+    by->make_safe(*item.last, [weak = weak_from_this(), by, action = item.action](const rr::Result<rr::Value>& result) {
+      const auto self = weak.lock();
+      if (result || !self) return;
+      log(LogLevel::error, "the device did not take a safe value",
+          {{"device", self->device_},
+           {"member", action.path + "." + action.member},
+           {"error", result.error().message}});
+      if (by->is_lost()) return self->owe_again(action.path);
+      if (result.error().code == rr::ErrorCode::request_timeout) self->doubts_.push_back({action.path, by->number()});
+    });
   }
-  return by->is_open();
+  return !by->is_lost();
 }
 
 }  // namespace rrgate

@@ -1,7 +1,8 @@
 // What makes a service of a device safe when a lease ends. Layer: server/upstream. See docs/leases.md.
 #pragma once
 
-#include <map>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,6 +29,10 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
  public:
   /// Those of `actions` that are about the service.
   SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions);
+  /// What is owed still is given up, and logged.
+  ~SafeValues();
+  SafeValues(const SafeValues&) = delete;
+  SafeValues& operator=(const SafeValues&) = delete;
 
   /// A session with the device is open: what the configuration says is held against what the device declares, and what
   /// could not be sent before is sent.
@@ -40,28 +45,48 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   bool has(std::string_view path) const;
   /// Whether some could not be sent yet.
   bool is_owing() const { return !owed_.empty(); }
-  /// Some could not be sent now.
-  void on_owed(std::function<void()> handler) { on_owed_ = std::move(handler); }
+  /// Some could not be sent now. `is_leased`  whether somebody has a lease of an object: what was sent before and has
+  /// not arrived is not sent again then, as the end of that lease makes the object safe.
+  void on_owed(std::function<void()> handler, std::function<bool(const std::string& path)> is_leased) {
+    on_owed_ = std::move(handler);
+    is_leased_ = std::move(is_leased);
+  }
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
-  /// they are sent as soon as there is one.
+  /// they are sent as soon as there is one. So are those that a session which is lost later has not answered.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by);
+  /// Sends what could not be sent before, where it has been held against what the device is now.
+  void pay(const std::shared_ptr<Upstream>& upstream);
+  /// The same for what is owed at, above and below a path, at once: somebody is about to command there.
+  void pay_around(std::string_view path, const std::shared_ptr<Upstream>& upstream);
+  /// The upstream has lost its session with the device.
+  void handle_lost(std::uint64_t upstream);
 
  private:
   struct Item {
     SafeAction action;
     rr::Result<SafeRequest> request;
     std::optional<SafeRequest> last = {};  ///< that was good: for leases of before the object was released
+    bool is_checked = false;               ///< looked at, well or not, since a session was opened
+  };
+  /// The device did not answer in time, and what its session is worth is not known yet.
+  struct Doubt {
+    std::string path;
+    std::uint64_t upstream = 0;
   };
 
   void look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream);
   void read(Item& item, Upstream& upstream);
   void take(Item& item, rr::Result<SafeRequest> request);
-  void pay(const std::shared_ptr<Upstream>& upstream);
+  bool is_checked(std::string_view path) const;
+  void pay_due(const std::shared_ptr<Upstream>& upstream, const std::function<bool(const std::string&)>& is_due);
+  void owe_again(const std::string& path);
 
   std::string device_;
   std::vector<Item> items_;
   std::vector<std::string> owed_;  ///< paths of leases that have ended while there was no session
+  std::vector<Doubt> doubts_;
   std::function<void()> on_owed_;
+  std::function<bool(const std::string&)> is_leased_;
 };
 
 }  // namespace rrgate

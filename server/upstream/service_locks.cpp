@@ -164,6 +164,9 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
   const bool is_new =
       result && (wanted.command == rr::LockCommand::acquire_lease || wanted.command == rr::LockCommand::take_lease);
   if (is_new) {
+    if (safe_->is_owing())
+      if (const auto open = open_upstream(client.upstream_in_use()))
+        safe_->pay_around(canonical_lock_path(wanted.path), open);
     table_.handle_leased(id, wanted.path, leases_.check_lock(0, wanted.path, now).error());
     const auto key = canonical_lock_path(wanted.path);
     auto& holder = holders_[key];
@@ -223,20 +226,27 @@ void ServiceLocks::end_leases(const std::string& why) {
 void ServiceLocks::handle_opened(const std::shared_ptr<Upstream>& upstream) {
   if (!device_.config().leases.is_offered || !upstream->may_act()) return;
   upstreams_[upstream->number()] = upstream;
-  safe_->on_owed([weak = weak_from_this()] {
-    if (const auto self = weak.lock()) self->wake_upstreams();
-  });
+  safe_->on_owed(
+      [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) self->pay_or_wake();
+      },
+      [weak = weak_from_this()](const std::string& path) {
+        const auto self = weak.lock();
+        return self && self->leases_.is_held(path);
+      });
   safe_->handle_opened(upstream);
 }
 
 /// What is owed is not to wait until somebody wants something of the device.
-void ServiceLocks::wake_upstreams() {
+void ServiceLocks::pay_or_wake() {
+  if (const auto open = open_upstream(nullptr)) return safe_->pay(open);
   for (const auto& [number, known] : upstreams_)
     if (const auto upstream = known.lock()) upstream->wake();
 }
 
 void ServiceLocks::handle_lost(const Upstream& upstream) {
   table_.handle_lost(upstream.number(), steady_now());
+  safe_->handle_lost(upstream.number());
   std::vector<std::string> lost;
   for (const auto& [path, holder] : holders_)
     if (holder.upstream.lock().get() == &upstream) lost.push_back(path);

@@ -86,7 +86,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   rr::Result<> handle_lease(const UpstreamClient& client, LockClient id, const rr::LockWanted& wanted);
   /// The device is made safe where leases have ended.
   void end_leases();
-  void wake_upstreams();
+  void pay_or_wake();
   std::shared_ptr<Upstream> open_upstream(const std::shared_ptr<Upstream>& first);
 
   /// Does what the table wants done.

@@ -134,6 +134,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Ends the session with the device as if it were lost.
   void break_off();
   bool is_open() const { return connection_ != nullptr; }
+  /// Also while the session has ended, and says so next: what failed has failed by that.
+  bool is_lost() const;
   /// For good: whoever wants more of the service begins anew.
   bool is_closed() const { return is_closed_; }
   Device& device() const { return *device_; }
@@ -148,7 +150,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Whether the service is for users who have logged in, and this session is nobody's.
   bool requires_user() const { return requires_user_; }
   /// Whether it is open, and the device lets it do anything.
-  bool may_act() const { return is_open() && !requires_user_; }
+  bool may_act() const { return !is_lost() && !requires_user_; }
   /// Null while it is not open.
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
@@ -310,8 +312,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<bool> watch_use();
   rr::awaitable<void> rest();
   void disconnect_when_safe(const std::shared_ptr<rr::ClientConnection>& connection);
-  /// Also while the session has ended, and says so next: what failed has failed by that.
-  bool is_lost() const;
   void lost(const rr::Error& reason);
   void tell_lost(const rr::Error& reason);
   rr::Result<> check_index(std::string_view path) const;

@@ -16,7 +16,7 @@ from leases import LEASES, PLAIN, wait_for
 from news import News
 from processes import free_port
 from shared_sites import Site, is_refused, start_arm_v2
-from tap import Held
+from tap import Held, Tap
 from users import PASSWORDS, basic, make_users
 
 GATEWAY = "rr+tcp://127.0.0.1:{}/?nodename=rrgate&service=gateway"
@@ -269,6 +269,43 @@ def test_a_device_that_was_away_is_made_safe_when_it_is_back(site):
         wait_for(lambda: is_safe(arm))
         site.gateway.wait_until(lambda: "the device is back, and was made safe" in site.gateway.description())
         assert page.refusal("set", "speed", value=1)[0] in ("ObjectLockedError", "ConnectionError")
+
+
+def test_safe_values_that_are_lost_with_their_connection_are_sent_again(node, tmp_path):
+    is_dead, swallowed = threading.Event(), bytearray()
+
+    def pass_on(data):
+        if not is_dead.is_set():
+            return data
+        swallowed.extend(data)
+        return b""
+    site = Site(tmp_path, node, {"leases": LEASES}, start_arm_v2, lambda port: Tap(port, pass_on))
+    try:
+        arm = site.direct("plain")
+        with Socket(site.port, PLAIN) as page:
+            page.ask("lease", deadman=20000)
+            page.ask("set", "speed", value=2)
+            page.ask("set", "target", value=3)
+            wait_for(lambda: (arm.speed, arm.seen_target) == (2, 3))
+            is_dead.set()
+            page.ask("release")
+            wait_for(lambda: b"speed" in swallowed and b"target" in swallowed)
+            assert (arm.speed, arm.seen_target) == (2, 3)
+            is_dead.clear()
+            site.line.cut()
+            wait_for(lambda: is_safe(arm))
+    finally:
+        site.stop()
+
+
+def test_what_is_owed_to_a_device_when_the_gateway_stops_is_logged(site):
+    with Socket(site.port, PLAIN) as page:
+        page.ask("lease", deadman=20000)
+        site.line.lead_to(free_port())
+        site.line.cut()
+        page.next(lease="plain", state="ended")
+        site.gateway.stop()
+    assert "the device was not made safe: it was away" in site.gateway.description()
 
 
 def test_a_gateway_that_stops_leaves_the_device_safe(site):

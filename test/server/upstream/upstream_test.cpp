@@ -107,11 +107,15 @@ struct Hanging {
   }
 };
 
-LeaseConfig leases_with_stop() {
+LeaseConfig leases_with(const std::string& function) {
   LeaseConfig leases;
   leases.is_offered = true;
-  leases.safe = {{SafeAction::Kind::call, "bench", "stop", "[]"}};
+  leases.safe = {{SafeAction::Kind::call, "bench", function, "[]"}};
   return leases;
+}
+
+LeaseConfig leases_with_stop() {
+  return leases_with("stop");
 }
 
 /// About a lease of the whole service, by `upstream`.
@@ -131,6 +135,13 @@ rr::ErrorCode ask_for_lease(UpstreamBench& bench, const std::shared_ptr<Upstream
 void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
                 std::chrono::milliseconds deadman = 10s) {
   REQUIRE(ask_for_lease(bench, upstream, holder, rr::LockCommand::acquire_lease, deadman) == rr::ErrorCode::none);
+}
+
+/// And the lease of the whole service ends: the device has got the call and does not answer it.
+void leave_unanswered(UpstreamBench& bench, Counting& device, const std::shared_ptr<Upstream>& upstream,
+                      HearingClient& holder) {
+  REQUIRE(ask_for_lease(bench, upstream, holder, rr::LockCommand::release_lease) == rr::ErrorCode::none);
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
 /// What the gateway asks in sessions that are opened from now on is answered within this time, or it has failed.
@@ -963,6 +974,83 @@ TEST_CASE("a device that was away when a lease ended is made safe when it is bac
   bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{});
   bench.open();
   CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+}
+
+TEST_CASE("a safe value that a session had not answered when it was lost is sent by the next one") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  const bool is_late = GENERATE(false, true);
+  if (is_late) answer_within(bench, 50ms);
+  bench.open();
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  leave_unanswered(bench, device, bench.upstream, holder);
+  if (is_late) {
+    const auto asked = bench.ask(holder, rr::CallKind::function, "bench", "wait");
+    REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+    CHECK((*asked)->error().code == rr::ErrorCode::request_timeout);
+  }
+  device.waiting.reset();
+  cut(bench, bench.upstream);
+  bench.open();
+  CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
+}
+
+TEST_CASE("a safe value that a lost session has not answered is sent by one that is open, but into no other lease") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  bench.open();
+  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  HearingClient holder(own);
+  HearingClient next(bench.upstream);
+  take_lease(bench, own, holder);
+  leave_unanswered(bench, device, own, holder);
+  const bool is_leased = GENERATE(false, true);
+  if (is_leased) take_lease(bench, bench.upstream, next);
+  device.waiting.reset();
+  cut(bench, own);
+  if (!is_leased) CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
+  const auto asked = bench.ask(next, rr::CallKind::property_get, "bench", "number");
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));  // what was sent before has arrived by then
+  CHECK(device.waiting.has_value() == !is_leased);
+  own->close();
+}
+
+TEST_CASE("a safe value that fits no more holds up no other that is owed") {
+  Counting device;
+  device.put_thing("Motor");
+  auto leases = leases_with_stop();
+  leases.safe.push_back({SafeAction::Kind::call, "bench.things[1]", "stop", "[]"});
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  bench.find("bench.things[1]");
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  cut(bench, bench.upstream);
+  device.service->root().release("things", "1");
+  device.put_thing("Part");
+  bench.open();
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+}
+
+TEST_CASE("what is owed to a device is sent before the commands of a new holder") {
+  Counting device;
+  device.put_thing("Motor");
+  auto leases = leases_with_stop();
+  leases.safe.push_back({SafeAction::Kind::call, "bench.things[1]", "stop", "[]"});
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  bench.find("bench.things[1]");
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  cut(bench, bench.upstream);
+  bench.open();  // and its objects are looked for still
+  take_lease(bench, bench.upstream, holder);
+  const auto sent = bench.ask(holder, rr::CallKind::poke_out, "bench", "wish", 0, {rr::Value(1.0)});
+  REQUIRE(bench.run_until([&] { return sent->has_value(); }));
+  CHECK((*sent)->has_value());
+  CHECK(device.commands.front() == "stop");
 }
 
 TEST_CASE("a session that rests is opened to make the device safe") {
