@@ -1028,9 +1028,14 @@ TEST_CASE("a safe value that fits no more holds up no other that is owed") {
   bench.find("bench.things[1]");
   HearingClient holder(bench.upstream);
   take_lease(bench, bench.upstream, holder);
-  cut(bench, bench.upstream);
-  device.service->root().release("things", "1");
+  HearingClient other(bench.upstream);
   device.put_thing("Part");
+  device.service->root().release("things", "1");
+  REQUIRE(bench.run_until([&] {
+    return ask_for_lease(bench, bench.upstream, other, rr::LockCommand::acquire_lease) ==
+           rr::ErrorCode::invalid_configuration;
+  }));
+  cut(bench, bench.upstream);
   bench.open();
   CHECK(bench.run_until([&] { return !device.commands.empty(); }));
 }
