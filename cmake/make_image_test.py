@@ -80,6 +80,9 @@ class Image(unittest.TestCase):
             {f"usr/lib/{triplet}/libssl.so.3": "libssl.so.3.0", "usr/share/doc/libssl3": "openssl-base"})
         self.put_deb("debian", "openssl-base", architecture, {f"usr/lib/{triplet}/libother.so.1": elf(architecture),
                                                               "usr/share/doc/openssl-base/copyright": b"terms of both"})
+        self.put_deb("debian", "ca-certificates", "all", {
+            "usr/share/ca-certificates/mozilla/B.crt": b"second\n", "usr/share/ca-certificates/mozilla/A.crt": b"first\n",
+            "usr/share/doc/ca-certificates/copyright": b"terms of the CAs"})
         return ours
 
     def run_tool(self, package, name="image.tar"):
@@ -126,11 +129,13 @@ class Image(unittest.TestCase):
         self.assertEqual(json.loads(files[docker["Config"]]), config)
         with tarfile.open(fileobj=io.BytesIO(layer)) as tar:
             members = {member.name: member for member in tar}
+            self.assertEqual(tar.extractfile("etc/ssl/certs/ca-certificates.crt").read(), b"first\nsecond\n")
+        self.assertIn("SSL_CERT_FILE=/etc/ssl/certs/ca-certificates.crt", start["Env"])
         self.assertEqual({name for name, member in members.items() if member.isfile()}, {
             "usr/bin/rrgate", "usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html", interpreter[1:],
             f"usr/lib/{triplet}/{interpreter.split('/')[-1]}", "etc/passwd", "etc/group", "etc/rrgate/gateway.json", "usr/share/doc/libc6/copyright",
-            "usr/share/doc/libssl3/copyright", *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
-            *(f"var/lib/dpkg/status.d/{name}" for name in ("rrgate", "libc6", "libssl3"))})
+            "usr/share/doc/libssl3/copyright", "usr/share/doc/ca-certificates/copyright", "etc/ssl/certs/ca-certificates.crt", *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
+            *(f"var/lib/dpkg/status.d/{name}" for name in ("rrgate", "libc6", "libssl3", "ca-certificates"))})
         self.assertEqual((members["tmp"].mode, members["usr/bin/rrgate"].mode, members["etc/passwd"].mode), (0o1777, 0o755, 0o644))
         self.assertTrue(all((member.uid, member.gid, member.mtime) == (0, 0, 1700000000) for member in members.values()))
 
@@ -148,8 +153,16 @@ class Image(unittest.TestCase):
                   if (each["spdxElementId"], each["relationshipType"]) == (archive["SPDXID"], "CONTAINS")]
         self.assertEqual(sorted((each["name"], each["versionInfo"], [ref["referenceLocator"] for ref in each.get("externalRefs", [])])
                                 for each in inside),
-                         [("libc6", "1.2", ["pkg:deb/debian/libc6@1.2?arch=arm64"]), ("libssl3", "1.2", ["pkg:deb/debian/libssl3@1.2?arch=arm64"]),
+                         [("ca-certificates", "1.2", ["pkg:deb/debian/ca-certificates@1.2?arch=all"]), ("libc6", "1.2", ["pkg:deb/debian/libc6@1.2?arch=arm64"]), ("libssl3", "1.2", ["pkg:deb/debian/libssl3@1.2?arch=arm64"]),
                           ("rrgate", "1.2", [])])
+
+    def test_an_image_without_cas_is_refused(self):
+        package = self.put_packages("amd64")
+        next(self.folder.glob("debian/ca-certificates_*")).unlink()
+        done, out = self.run_tool(package)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("no package has CAs", done.stderr)
+        self.assertFalse(out.exists())
 
     def test_a_library_that_no_package_has_is_named(self):
         package = self.put_packages("amd64")

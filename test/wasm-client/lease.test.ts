@@ -205,11 +205,28 @@ describe("a lease that is given up while it is asked for", () => {
     void held.release().catch(() => undefined);
     await settle();
     let again: Promise<unknown> | undefined;
-    await giveUp(() => void (again = failure(lease(robot, { timeout: 100 }))));
+    const second = new AbortController();
+    await giveUp(() => void (again = failure(lease(robot, { signal: second.signal }))));
     expect(commands()).toEqual([acquire, release, acquire, acquire]);
+    second.abort();
     await again;
     await settle();
     expect(commands().slice(4)).toEqual([release]);
+  });
+
+  it("stays refused where it was lost, until it is released", async () => {
+    const stop = gateway(() => Promise.reject(new Error("taken over")));
+    const held = await lease(robot, { deadman: 150 });
+    await held.ended;
+    expect(held.state).toBe("lost");
+    stop();
+    const before = commands().length;
+    await giveUp();
+    expect(commands().slice(before)).toEqual([acquire]);
+    void held.release().catch(() => undefined);
+    await settle();
+    await giveUp();
+    expect(commands().slice(before)).toEqual([acquire, release, acquire, release]);
   });
 
   it("is not given back where the gateway was not asked, or refuses", async () => {

@@ -463,7 +463,7 @@ it("ends a loop over a pipe whose endpoint was closed because more came at once;
   await client["stream_echo"]!(1, 400);
   const error = await loop;
   expect(error.code).toBe(ErrorCode.OutOfSystemResource);
-  expect(error.message).toContain("more than 10 values");
+  expect(error.message).toMatch(/more than 10 (values|packets)/); // the latter of the worker
   expect(seen.length).toBeLessThan(400);
   expect(failed).toEqual([ErrorCode.OutOfSystemResource]);
 

@@ -202,7 +202,7 @@ it("closes an endpoint whose packets nobody takes, after as many as connect() sa
   await page.isQuiet();
   const closed = (await page.takeUntil(({ kind }) => kind === "pipe_closed")) as Event & { kind: "pipe_closed" };
   expect(closed.error!.name).toBe("RobotRaconteur.OutOfSystemResource");
-  expect(closed.error!.message).toContain("more than 300 values");
+  expect(closed.error!.message).toContain("more than 300 packets");
   await page.takeUntil(completed(page.ask("getProperty", "speed")));
   expect(valuesOf(page, "pipe").length).toBeLessThanOrEqual(200 + 256 + 301); // nothing comes after it
   // Another one is as good as new.

@@ -20,27 +20,36 @@ export async function lease(object: { readonly $: ObjectInfo }, options: LeaseOp
   if (isHidden()) throw makeError("InvalidOperation", "this page is hidden: it can hold no lease");
   const session = Info.sessionOf(object);
   const path = object.$.path;
-  const ask = (command: number, more: CallOptions = {}) =>
-    session.request((core) => core.lease(path, command, deadman), more);
+  const lost = lostIn.get(session) ?? new Set<string>();
+  lostIn.set(session, lost);
+  const ask = (command: number, more: CallOptions = {}) => {
+    if (command === Command.release) lost.delete(path);
+    return session.request((core) => core.lease(path, command, deadman), more);
+  };
   const askedAt = performance.now();
   const { signal } = options;
   const wasAborted = signal?.aborted;
   const asked = asking.get(session) ?? [];
   asking.set(session, asked);
   asked.push(path);
+  const settled = () => asked.splice(asked.indexOf(path), 1);
   try {
-    const asks = ask(options.takeover ? Command.takeOver : Command.acquire, options);
-    await asks.finally(() => asked.splice(asked.indexOf(path), 1));
+    await ask(options.takeover ? Command.takeOver : Command.acquire, options);
   } catch (error) {
+    settled();
     const isLate = error instanceof RobotRaconteurError && error.code === ErrorCode.RequestTimeout;
     const isGivenUp = isLate || (signal?.aborted && !wasAborted);
-    // The gateway may grant it yet, and nobody would renew it.
-    if (isGivenUp && !asked.includes(path) && !limits.get(session)?.has(path))
+    // The gateway may grant it yet, and nobody would renew it. One that was lost is refused until it is released or taken
+    // again: that stays so.
+    if (isGivenUp && !asked.includes(path) && !limits.get(session)?.has(path) && !lost.has(path))
       void ask(Command.release).catch(() => undefined);
     throw explain(error);
   }
   const held = new HeldLease(ask, deadman, askedAt);
   held.whenOver(limitCalls(session, path, options.callTimeout ?? defaultCallTimeout));
+  settled(); // not before it is among those that are held
+  lost.delete(path);
+  held.onLost(() => lost.add(path));
   held.whenOver(
     session.onClose((reason) => held.lose(reason ?? makeError("ConnectionError", "the session was closed"))),
   );
@@ -49,6 +58,8 @@ export async function lease(object: { readonly $: ObjectInfo }, options: LeaseOp
 
 /** The objects whose leases are asked for, once for each call. */
 const asking = new WeakMap<Session, string[]>();
+/** The objects whose leases were lost, and neither released nor taken again since. */
+const lostIn = new WeakMap<Session, Set<string>>();
 /** The objects whose leases are held. */
 const limits = new WeakMap<Session, Map<string, number>>();
 
