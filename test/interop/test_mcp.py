@@ -171,10 +171,13 @@ def test_without_mcp_in_the_configuration_there_are_no_agents(node, tmp_path):
 
 
 def test_a_value_that_is_too_long_is_no_resource(device, tmp_path):
+    async def read(session):
+        with pytest.raises(MCPError, match="longer than"):
+            await session.read_resource("rrgate://interop/interop/p_doubles")
+
     gateway, port = start_gateway(tmp_path, device, device={"mode": "shared"}, mcp={})
     try:
-        assert ask(port, "PUT", "/p_doubles", [0.125] * 60_000).status == 204
-        with pytest.raises(MCPError, match="longer than"):
-            with_agent(port, lambda session: session.read_resource("rrgate://interop/interop/p_doubles"))
+        assert ask(port, "PUT", "/api/v1/devices/interop/interop/p_doubles", [0.125] * 60_000).status == 204
+        with_agent(port, read)
     finally:
         gateway.stop()
