@@ -196,9 +196,23 @@ def test_a_list_that_has_changed_is_told(lab, tmp_path):
         say(process, "initialize", 1, protocolVersion="2025-11-25", capabilities={}, clientInfo={"name": "test", "version": "1"})
         assert hear(process)["result"]["capabilities"]["resources"]["listChanged"] is True
         say(process, "notifications/initialized")
-        time.sleep(2)  # it listens by now
-        lose_role(tmp_path)
-        assert hear(process) == {"jsonrpc": "2.0", "method": "notifications/resources/list_changed"}
+        told = threading.Event()
+        with_role = (tmp_path / "tokens").read_text()
+
+        def change():  # until it is told: nobody says when the program has begun to listen
+            while not told.wait(1):
+                if (tmp_path / "tokens").read_text() == with_role:
+                    lose_role(tmp_path)
+                else:
+                    (tmp_path / "tokens").write_text(with_role)
+
+        changing = threading.Thread(target=change)
+        changing.start()
+        try:
+            assert hear(process) == {"jsonrpc": "2.0", "method": "notifications/resources/list_changed"}
+        finally:
+            told.set()
+            changing.join()
 
 
 def test_a_url_of_nothing_is_not_understood():
