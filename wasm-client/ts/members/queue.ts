@@ -6,7 +6,7 @@ export const queueLimits = { limit: 10_000, maxBytes: 64 * 1024 * 1024 };
 
 /** Why a loop ends where more waits for it than may. */
 export function overflowError(name: string, limit: number, maxBytes: number): Error {
-  const what = `more than ${limit} values of ${name} or ${maxBytes} bytes of them wait`;
+  const what = `more than ${limit} values or ${maxBytes} bytes of ${name} wait`;
   return makeError("OutOfSystemResource", `${what}, and nobody takes them`);
 }
 

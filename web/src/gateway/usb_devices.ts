@@ -38,7 +38,9 @@ export class UsbDeviceList {
   readonly #refresh = async (): Promise<void> => {
     const round = ++this.#round;
     try {
-      const devices = await Promise.all((await listUsbDevices()).map(describe));
+      const allowed = await usbOfBrowser()?.getDevices();
+      // What asks them who they are is loaded where there are some.
+      const devices = allowed?.length ? await Promise.all((await listUsbDevices()).map(describe)) : [];
       if (round === this.#round) this.devices.value = devices;
     } catch (error) {
       if (round === this.#round) this.trouble.value = (error as Error).message;
@@ -95,6 +97,6 @@ async function servicesOf(url: string): Promise<Service[]> {
   }
 }
 
-function usbOfBrowser(): EventTarget | undefined {
-  return (navigator as { usb?: EventTarget }).usb;
+function usbOfBrowser(): (EventTarget & { getDevices(): Promise<unknown[]> }) | undefined {
+  return (navigator as { usb?: ReturnType<typeof usbOfBrowser> }).usb;
 }
