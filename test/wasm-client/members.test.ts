@@ -264,7 +264,7 @@ describe("events", () => {
     for (let side = 0; side < 15; ++side) expect((await loop.next()).value[0]).toBe(side);
     const error = await failure(loop.next());
     expect(error.code).toBe(ErrorCode.OutOfSystemResource);
-    expect(error.message).toContain("bump or 67108864 bytes");
+    expect(error.message).toContain("67108864 bytes of bump");
   });
 
   it("end a loop with the reason why there will be no more", async () => {
