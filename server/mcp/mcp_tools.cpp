@@ -96,7 +96,7 @@ const McpTools::Tool McpTools::tools[] = {
          "inputSchema": {"type": "object", "properties": {
            "device": {"type": "string"},
            "path": {"type": "string", "description": "SERVICE/OBJECT/PROPERTY"},
-           "value": {"anyOf": [{"type": "array", "items": {"type": ["boolean", "null", "number", "object", "string"]}}, {"type": "boolean"}, {"type": "null"}, {"type": "number"}, {"type": "object"}, {"type": "string"}], "description": "as its schema says"},
+           "value": {"anyOf": [{"type": "array", "items": {"anyOf": [{"type": "boolean"}, {"type": "null"}, {"type": "number"}, {"type": "object"}, {"type": "string"}]}}, {"type": "boolean"}, {"type": "null"}, {"type": "number"}, {"type": "object"}, {"type": "string"}], "description": "as its schema says"},
            "why": {"type": "string", "maxLength": 500, "description": "what it is good for, for the person who is asked"},
            "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
            "required": ["device", "path", "value", "why"], "additionalProperties": false},
