@@ -156,21 +156,15 @@ class Image(unittest.TestCase):
                          [("ca-certificates", "1.2", ["pkg:deb/debian/ca-certificates@1.2?arch=all"]), ("libc6", "1.2", ["pkg:deb/debian/libc6@1.2?arch=arm64"]), ("libssl3", "1.2", ["pkg:deb/debian/libssl3@1.2?arch=arm64"]),
                           ("rrgate", "1.2", [])])
 
-    def test_an_image_without_cas_is_refused(self):
-        package = self.put_packages("amd64")
-        next(self.folder.glob("debian/ca-certificates_*")).unlink()
-        done, out = self.run_tool(package)
-        self.assertNotEqual(done.returncode, 0)
-        self.assertIn("no package has CAs", done.stderr)
-        self.assertFalse(out.exists())
-
-    def test_a_library_that_no_package_has_is_named(self):
-        package = self.put_packages("amd64")
-        next(self.folder.glob("debian/libssl3_*")).unlink()
-        done, out = self.run_tool(package)
-        self.assertNotEqual(done.returncode, 0)
-        self.assertIn("no package has the library libssl.so.3", done.stderr)
-        self.assertFalse(out.exists())
+    def test_what_no_package_has_is_named(self):
+        for lacking, sentence in (("libssl3", "no package has the library libssl.so.3"), ("ca-certificates", "no package has CAs")):
+            with self.subTest(lacking):
+                package = self.put_packages("amd64")
+                next(self.folder.glob(f"debian/{lacking}_*")).unlink()
+                done, out = self.run_tool(package)
+                self.assertNotEqual(done.returncode, 0)
+                self.assertIn(sentence, done.stderr)
+                self.assertFalse(out.exists())
 
     def test_programs_and_libraries_of_two_architectures_are_refused(self):
         package = self.put_packages("amd64")

@@ -28,6 +28,7 @@ constexpr int resource_not_found = -32002;
 /// Which has requests that are answered with news.
 constexpr const char* listening_revision = "2026-07-28";
 constexpr const char* list_changed = "notifications/resources/list_changed";
+constexpr const char* resource_updated = "notifications/resources/updated";
 /// After a cut; twice as long each time, until something is told: the gateway records each refusal.
 constexpr std::chrono::seconds first_pause{1};
 constexpr std::chrono::seconds longest_pause{60};
@@ -88,6 +89,10 @@ struct McpBridge::Subscription {
   rr::OrderedJson wanted() const {
     if (uri.empty()) return true;
     return rr::OrderedJson::array({uri});
+  }
+  rr::OrderedJson news() const {
+    if (uri.empty()) return {{"jsonrpc", "2.0"}, {"method", list_changed}};
+    return {{"jsonrpc", "2.0"}, {"method", resource_updated}, {"params", {{"uri", uri}}}};
   }
   void end() {
     is_over = true;
@@ -215,16 +220,14 @@ void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
     if (!id.is_null()) return give_up(id, uri, "there is no " + rr::quote(uri) + " whose changes can be told");
     if (!is_told) return subscription.listening.stream->close();  // not there yet
     if (uri.empty() && is_first) return;
-  } else if (method != "notifications/resources/updated" && method != list_changed) {
+  } else if (method != resource_updated && method != list_changed) {
     const auto why = text_in(news, {"error", "message"});
     if (!why.empty() && !subscription.id.is_null()) give_up(std::exchange(subscription.id, nullptr), uri, why);
     if (!why.empty() && uri.empty() && !subscription.has_begun) subscription.end();  // an older gateway
     return;
   }
   // After a cut nobody knows whether it has changed.
-  if (uri.empty()) return tell_(rr::write_json({{"jsonrpc", "2.0"}, {"method", list_changed}}));
-  tell_(
-      rr::write_json({{"jsonrpc", "2.0"}, {"method", "notifications/resources/updated"}, {"params", {{"uri", uri}}}}));
+  tell_(rr::write_json(subscription.news()));
 }
 
 void McpBridge::give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/config/tls_files.hpp"
+
 namespace rrgate {
 
 namespace {
@@ -49,7 +51,7 @@ std::vector<Finding> find_cautions(const Config& config) {
     out.push_back({"/access/jwt/audience", "missing: a token that was made for another service is taken"});
   for (std::size_t i = 0; i < config.devices.size(); ++i) {
     const auto& url = config.devices[i].url;
-    if (url.scheme.starts_with("rrs+") && !url.node_id)
+    if (has_node_tls(url) && !url.node_id)
       out.push_back({"/devices/" + std::to_string(i) + "/url",
                      "names no nodeid: whoever has a certificate of a node may pretend to be this device"});
   }

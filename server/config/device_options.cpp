@@ -5,6 +5,7 @@
 
 #include "node/transport/schemes.hpp"
 #include "server/config/lease_options.hpp"
+#include "server/config/tls_files.hpp"
 
 namespace rrgate {
 
@@ -137,9 +138,9 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
                "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
   read_way(in, device);
   in.object("tls", [&](ObjectReader& part) { part.files("ca", device.tls.ca); });
-  const auto& scheme = device.url.scheme;
-  if (!device.tls.ca.empty() && !scheme.empty() && !scheme.starts_with("rrs+") && !scheme.ends_with("+wss"))
-    in.finding("tls", "has a CA, but there is no TLS in " + rr::quote(scheme + "://") +
+  const auto& url = device.url;
+  if (!device.tls.ca.empty() && !url.scheme.empty() && !has_node_tls(url) && !has_https(url))
+    in.finding("tls", "has a CA, but there is no TLS in " + rr::quote(url.scheme + "://") +
                           "; expected rrs+tcp or another with TLS");
 }
 

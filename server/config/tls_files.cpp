@@ -61,23 +61,23 @@ bool TlsFiles::reload() {
   return loaded.has_value();
 }
 
-namespace {
-
-bool has_node_tls(const DeviceConfig& device) {
-  const auto* scheme = rr::find_url_scheme(device.url.scheme);
+bool has_node_tls(const rr::ConnectionUrl& url) {
+  const auto* scheme = rr::find_url_scheme(url.scheme);
   return scheme && scheme->is_secure;
 }
 
-}  // namespace
+bool has_https(const rr::ConnectionUrl& url) {
+  return url.scheme.ends_with("+wss");
+}
 
 std::shared_ptr<TlsFiles> make_device_tls(const DeviceConfig& device) {
-  return has_node_tls(device) ? std::make_shared<TlsFiles>(device.tls) : nullptr;
+  return has_node_tls(device.url) ? std::make_shared<TlsFiles>(device.tls) : nullptr;
 }
 
 std::shared_ptr<TlsFiles> make_device_https(const DeviceConfig& device) {
-  if (!device.url.scheme.ends_with("+wss")) return nullptr;
+  if (!has_https(device.url)) return nullptr;
   // Of the two, TLS between the nodes has the CAs of the configuration.
-  return std::make_shared<TlsFiles>(TlsFiles::of_https(has_node_tls(device) ? DeviceTls() : device.tls));
+  return std::make_shared<TlsFiles>(TlsFiles::of_https(has_node_tls(device.url) ? DeviceTls() : device.tls));
 }
 
 }  // namespace rrgate

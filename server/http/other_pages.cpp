@@ -2,11 +2,14 @@
 
 namespace rrgate {
 
+namespace {
+
+/// The devices, and the tickets that a page connects to them with.
 bool is_for_other_pages(std::string_view path) {
-  constexpr std::string_view devices = "/api/v1/devices";
-  return path == "/api/v1/tickets" || path == devices ||
-         (path.starts_with(devices) && path.substr(devices.size()).starts_with('/'));
+  return path == "/api/v1/tickets" || path == "/api/v1/devices" || path.starts_with("/api/v1/devices/");
 }
+
+}  // namespace
 
 std::vector<std::pair<std::string, std::string>> headers_for_page(const Request& request) {
   const auto origin = request.header(http::field::origin);

@@ -10,9 +10,6 @@
 
 namespace rrgate {
 
-/// Paths that such a page may read: the devices, and the tickets that it connects to them with.
-bool is_for_other_pages(std::string_view path);
-
 /// The headers that let the page of `request` read the answer; none where no page asks.
 std::vector<std::pair<std::string, std::string>> headers_for_page(const Request& request);
 

@@ -4,84 +4,13 @@
 #include <boost/asio/steady_timer.hpp>
 #include <thread>
 
-#include "server/upstream/lock_table.hpp"
-#include "server/upstream/safe_values.hpp"
-#include "test/server/upstream/upstream_bench.hpp"
+#include "test/server/upstream/counting_device.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;
 using namespace std::chrono_literals;
 
 namespace {
-
-constexpr const char* definition = R"(service test.bench
-stdver 0.10
-object Part
-    wire double level [readonly]
-end
-object Motor
-    function void stop()
-end
-object Bench
-    event struck(int32 number)
-    wire double level [readonly]
-    wire double wish [writeonly]
-    pipe int32 news [readonly]
-    property int32 number
-    callback int32 ask()
-    function int32{generator} count()
-    function void wait()
-    function void take(uint8[] bytes)
-    function void stop()
-    objref Bench spare
-    objref Bench{int32} others
-    objref Part{int32} parts
-    objref varobject{int32} things
-end
-)";
-
-struct Counting {
-  std::shared_ptr<const bool> life = std::make_shared<const bool>(true);
-  std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "bench", "Bench");
-  std::optional<rr::Reply<void>> waiting;  ///< whoever called wait()
-  std::vector<std::string> commands;       ///< calls of stop(), and values of "wish"
-  std::int32_t number = 1;
-  int reads = 0;  ///< of the number
-  std::shared_ptr<rr::Object> thing;
-
-  Counting() {
-    service->generator(
-        "count", [this] { return [next = 0, token = life]() mutable { return std::optional<std::int32_t>(++next); }; });
-    service->root().objref("spare", std::shared_ptr<rr::Object>());
-    service->root().objref("others", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
-    service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
-    service->root().objref("things", [this](std::string_view) { return thing; });
-    service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
-    service->function("take", [](const std::vector<std::uint8_t>&) {});
-    service->property("number")
-        .get([this] {
-          ++reads;
-          return number;
-        })
-        .set([this](std::int32_t value) { number = value; });
-    service->function("stop", [this] { commands.emplace_back("stop"); });
-    service->on_wire("wish", [this](double value) { commands.push_back(std::to_string(value)); });
-  }
-  void put_thing(const std::string& type) {
-    thing = service->make_object(type);
-    if (type == "Motor") thing->function("stop", [this] { commands.emplace_back("stop"); });
-  }
-  /// Generators that clients have opened and not closed.
-  long open_generators() const { return life.use_count() - 1; }
-};
-
-/// Everybody is who he says, and nobody is nobody.
-class Believing final : public rr::Authenticator {
- public:
-  rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt& attempt) const override {
-    return rr::AuthenticatedUser{attempt.username};
-  }
-};
 
 /// A generator whose values come late.
 struct Hanging {
@@ -106,55 +35,6 @@ struct Hanging {
     for (const auto& call : std::exchange(calls, {})) call->answer(rr::Value(std::int32_t{1}));
   }
 };
-
-LeaseConfig leases_with(const std::string& function) {
-  LeaseConfig leases;
-  leases.is_offered = true;
-  leases.safe = {{SafeAction::Kind::call, "bench", function, "[]"}};
-  return leases;
-}
-
-LeaseConfig leases_with_stop() {
-  return leases_with("stop");
-}
-
-/// About a lease of the whole service, by `upstream`.
-rr::ErrorCode ask_for_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
-                            rr::LockCommand command, std::chrono::milliseconds deadman = 10s) {
-  std::optional<rr::ErrorCode> answer;
-  rr::LockWanted wanted;
-  wanted.command = command;
-  wanted.path = "bench";
-  wanted.timeout = deadman;
-  upstream->lock(holder, wanted,
-                 [&](const rr::Result<>& result) { answer = result ? rr::ErrorCode::none : result.error().code; });
-  REQUIRE(bench.run_until([&] { return answer.has_value(); }));
-  return *answer;
-}
-
-void take_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream, HearingClient& holder,
-                std::chrono::milliseconds deadman = 10s) {
-  REQUIRE(ask_for_lease(bench, upstream, holder, rr::LockCommand::acquire_lease, deadman) == rr::ErrorCode::none);
-}
-
-/// And the lease of the whole service ends: the device has got the call and does not answer it.
-void leave_unanswered(UpstreamBench& bench, Counting& device, const std::shared_ptr<Upstream>& upstream,
-                      HearingClient& holder) {
-  REQUIRE(ask_for_lease(bench, upstream, holder, rr::LockCommand::release_lease) == rr::ErrorCode::none);
-  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-}
-
-/// What the gateway asks in sessions that are opened from now on is answered within this time, or it has failed.
-void answer_within(UpstreamBench& bench, std::chrono::milliseconds timeout) {
-  bench.config.timeouts.request = timeout;
-  const auto config = bench.device->config();
-  bench.device->become(config, bench.config);
-}
-
-void cut(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream) {
-  upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
-  REQUIRE(bench.run_until([&] { return !upstream->is_open(); }));
-}
 
 /// When a session is opened that is lost at once.
 struct Attempts {
@@ -519,64 +399,6 @@ TEST_CASE("a request whose client leaves while its object is looked for has fail
   own->close();
 }
 
-TEST_CASE("what makes safe is held against the object that the device has now") {
-  Counting device;
-  device.put_thing("Motor");
-  LeaseConfig leases;
-  leases.is_offered = true;
-  leases.safe = {{SafeAction::Kind::call, "bench.things[1]", "stop", "[]"}};
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  HearingClient client(bench.upstream);
-  const auto ask = [&](rr::LockCommand command) { return ask_for_lease(bench, bench.upstream, client, command); };
-  // Those that follow come behind the answer of the device to the question what it has now.
-  const auto acquire = [&] {
-    bench.find("bench.others[1]");
-    return ask(rr::LockCommand::acquire_lease);
-  };
-  const auto replace = [&] {
-    const auto before = client.heard.size();
-    device.service->root().release("things", "1");
-    REQUIRE(bench.run_until([&] { return client.heard.size() > before; }));
-  };
-  CHECK(acquire() == rr::ErrorCode::none);
-  CHECK(ask(rr::LockCommand::release_lease) == rr::ErrorCode::none);
-  device.put_thing("Part");
-  replace();
-  CHECK(acquire() == rr::ErrorCode::invalid_configuration);
-  device.put_thing("Motor");
-  replace();
-  CHECK(acquire() == rr::ErrorCode::none);
-  CHECK(ask(rr::LockCommand::release_lease) == rr::ErrorCode::none);
-  device.thing.reset();
-  replace();
-  CHECK(acquire() == rr::ErrorCode::invalid_configuration);
-  device.put_thing("Motor");  // of which nobody is told
-  CHECK(bench.run_until([&] { return acquire() == rr::ErrorCode::none; }));
-}
-
-TEST_CASE("a lease of before its object was released makes safe what the device has there now") {
-  Counting device;
-  device.put_thing("Motor");
-  LeaseConfig leases;
-  leases.is_offered = true;
-  leases.safe = {{SafeAction::Kind::call, "bench.things[1]", "stop", "[]"}};
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  HearingClient client(bench.upstream);
-  CHECK(bench.run_until([&] {
-    return ask_for_lease(bench, bench.upstream, client, rr::LockCommand::acquire_lease) == rr::ErrorCode::none;
-  }));
-  const auto before = client.heard.size();
-  device.thing.reset();
-  device.service->root().release("things", "1");
-  REQUIRE(bench.run_until([&] { return client.heard.size() > before; }));
-  bench.find("bench.others[1]");  // behind the answer of the device that it is not there
-  device.put_thing("Motor");
-  REQUIRE(ask_for_lease(bench, bench.upstream, client, rr::LockCommand::release_lease) == rr::ErrorCode::none);
-  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
-}
-
 TEST_CASE("who asks for a member whatever its object is releases nothing") {
   const std::string path = "bench.things[1]";
   Counting device;
@@ -602,41 +424,6 @@ TEST_CASE("what a device was asked when its service ended is told to be lost wit
   REQUIRE(bench.run_until([&] { return asked->has_value(); }));
   REQUIRE_FALSE((**asked).has_value());
   CHECK((*asked)->error().message == "connection_lost: device 'device': the service was closed");
-}
-
-TEST_CASE("a session is ended behind the answer of what makes the device safe, and that is waited for") {
-  Counting device;
-  UpstreamBench bench(device.service);
-  bench.open();
-  bool is_gone = false;
-  bool is_safe = false;
-  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
-  const SafeRequest request{SafeAction::Kind::call, "bench", "wait", {}};
-  bench.upstream->make_safe(request, [&](const rr::Result<rr::Value>& result) { is_safe = result.has_value(); });
-  bench.upstream->close();
-  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-  bool has_passed = false;
-  boost::asio::steady_timer while_it_waits(bench.io, 100ms);
-  while_it_waits.async_wait([&](const auto&) { has_passed = true; });
-  REQUIRE(bench.run_until([&] { return has_passed; }));
-  CHECK_FALSE(is_gone);
-  CHECK(bench.device->is_closing());
-  (*device.waiting)();
-  REQUIRE(bench.run_until([&] { return is_gone && !bench.device->is_closing(); }));
-  CHECK(is_safe);
-}
-
-TEST_CASE("a device that does not answer what makes it safe holds the end of a session up for a second alone") {
-  Counting device;
-  UpstreamBench bench(device.service);
-  bench.open();
-  bool is_gone = false;
-  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
-  const auto begin = std::chrono::steady_clock::now();
-  bench.upstream->make_safe({SafeAction::Kind::call, "bench", "wait", {}}, ignore_result);
-  bench.upstream->close();
-  REQUIRE(bench.run_until([&] { return is_gone && !bench.device->is_closing(); }));
-  CHECK(std::chrono::steady_clock::now() - begin >= 1s);
 }
 
 TEST_CASE("an index of a plain objref is refused before the device is asked, which may ignore it") {
@@ -675,43 +462,6 @@ TEST_CASE("an index of a plain objref is refused before the device is asked, whi
   CHECK(bench.run_until([&] { return answer.has_value(); }));
   CHECK(asked == 1);
   CHECK((answer && answer->has_error()));
-}
-
-TEST_CASE("what makes a device safe is its last command, whatever a client has sent to a wire before") {
-  Counting device;
-  UpstreamBench bench(device.service);
-  bench.open();
-  const auto& wire = *bench.upstream->object_type("bench")->find_member("wish");
-  HearingClient client(bench.upstream);
-  bench.upstream->join_wire(client, "bench", wire);
-  REQUIRE(bench.run_until([&] { return !client.heard.empty(); }));
-  const std::vector<rr::Value> much{rr::Value(std::vector<std::uint8_t>(4'000'000))};
-  bench.upstream->connection()->call("bench", "take", much, ignore_result);
-  REQUIRE(bench.upstream->connection()->session().queued_bytes() > 1'000'000);
-  CHECK(bench.upstream->send_wire(client, "bench", wire, rr::Value(100.0)).has_value());
-  const std::vector<SafeAction> actions{{SafeAction::Kind::call, "bench", "stop", "[]"}};
-  const auto safe = std::make_shared<SafeValues>("device", "bench", actions);
-  safe->handle_opened(bench.upstream);
-  CHECK(safe->send("bench", bench.upstream));
-  const auto before = device.commands.size();
-  REQUIRE(bench.run_until([&] { return device.commands.size() >= before + 2; }));
-  bench.find("bench");  // whatever else there is has been sent by then
-  CHECK(device.commands == std::vector<std::string>{"stop", "stop"});
-}
-
-TEST_CASE("what makes safe is known however an index is spelled, and so are rules of leases") {
-  const SafeValues safe("device", "s", {{SafeAction::Kind::call, "s.arms[left_arm]", "stop", "[]"}});
-  for (const std::string path : {"s.arms[left_arm]", "s.arms[left%5farm]", "s.arms[left%5Farm]"}) {
-    CHECK(safe.has(canonical_lock_path(path)));
-    for (const std::string rule : {"s.arms[left_arm].stop", "s.arms[left%5farm].stop", "s.arms[*_arm].stop"}) {
-      LeaseConfig leases;
-      leases.is_offered = true;
-      leases.members = {{rule, LeaseNeed::never}};
-      CHECK(leases.need_of(path + ".stop") == LeaseNeed::never);
-      CHECK(leases.is_urgent("s.arms.left_arm.stop"));
-      CHECK(leases.need_of(path + ".go") == LeaseNeed::covered);
-    }
-  }
 }
 
 TEST_CASE("a client that goes on as another user hears what has become of what it waits for") {
@@ -891,25 +641,6 @@ TEST_CASE("who waits for a monitor gets none below a lease that its holder has t
   CHECK(locks.ask(waiter, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
 }
 
-TEST_CASE("a session that rests is ended behind the answer of what makes the device safe") {
-  Counting device;
-  UpstreamBench bench(device.service);
-  bench.upstream->rest_unused(50ms);
-  bench.upstream->keep_open({10s, 10s, 10s});
-  REQUIRE(bench.wait_for(bench.upstream->opened()).has_value());
-  bool is_gone = false;
-  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
-  bench.upstream->make_safe({SafeAction::Kind::call, "bench", "wait", {}}, ignore_result);
-  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting() && device.waiting.has_value(); }));
-  bool has_passed = false;
-  boost::asio::steady_timer while_it_waits(bench.io, 100ms);
-  while_it_waits.async_wait([&](const auto&) { has_passed = true; });
-  REQUIRE(bench.run_until([&] { return has_passed; }));
-  CHECK_FALSE(is_gone);
-  (*device.waiting)();
-  CHECK(bench.run_until([&] { return is_gone; }));
-}
-
 TEST_CASE("reads are shared, but whoever reads behind a command hears what has come of it") {
   Counting device;
   UpstreamBench bench(device.service);
@@ -957,145 +688,6 @@ TEST_CASE("a client that is gone is not asked with all others, and the device ha
   CHECK(bench.run_until([&] { return heard.has_value(); }));
   CHECK(asked == 0);
   CHECK((heard && !*heard));
-}
-
-TEST_CASE("a device that was away when a lease ended is made safe when it is back, though nobody uses it any more") {
-  Counting device;
-  UpstreamBench bench(device.service, leases_with_stop());
-  bench.open();
-  std::optional<HearingClient> holder(std::in_place, bench.upstream);
-  take_lease(bench, bench.upstream, *holder);
-  cut(bench, bench.upstream);
-  holder.reset();
-  bench.upstream->close();
-  const std::weak_ptr<Upstream> before = std::exchange(bench.upstream, nullptr);
-  REQUIRE(bench.run_until([&] { return before.expired(); }));
-  CHECK(device.commands.empty());
-  bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{});
-  bench.open();
-  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
-}
-
-TEST_CASE("a safe value that a session had not answered when it was lost is sent by the next one") {
-  Counting device;
-  UpstreamBench bench(device.service, leases_with("wait"));
-  const bool is_late = GENERATE(false, true);
-  if (is_late) answer_within(bench, 50ms);
-  bench.open();
-  HearingClient holder(bench.upstream);
-  take_lease(bench, bench.upstream, holder);
-  leave_unanswered(bench, device, bench.upstream, holder);
-  auto unanswered = std::exchange(device.waiting, std::nullopt);
-  if (is_late) {
-    const auto asked = bench.ask(holder, rr::CallKind::function, "bench", "wait");
-    REQUIRE(bench.run_until([&] { return asked->has_value(); }));
-    CHECK((*asked)->error().code == rr::ErrorCode::request_timeout);
-  }
-  device.waiting.reset();
-  cut(bench, bench.upstream);
-  bench.open();
-  CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
-}
-
-TEST_CASE("a safe value that a lost session has not answered is sent by one that is open, but into no other lease") {
-  Counting device;
-  UpstreamBench bench(device.service, leases_with("wait"));
-  bench.open();
-  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
-  REQUIRE(bench.wait_for(own->open()).has_value());
-  HearingClient holder(own);
-  HearingClient next(bench.upstream);
-  take_lease(bench, own, holder);
-  leave_unanswered(bench, device, own, holder);
-  const bool is_leased = GENERATE(false, true);
-  if (is_leased) take_lease(bench, bench.upstream, next);
-  device.waiting.reset();
-  cut(bench, own);
-  if (!is_leased) CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
-  const auto asked = bench.ask(next, rr::CallKind::property_get, "bench", "number");
-  REQUIRE(bench.run_until([&] { return asked->has_value(); }));  // what was sent before has arrived by then
-  CHECK(device.waiting.has_value() == !is_leased);
-  own->close();
-}
-
-TEST_CASE("a safe value that fits no more holds up no other that is owed") {
-  Counting device;
-  device.put_thing("Motor");
-  auto leases = leases_with_stop();
-  leases.safe.push_back({SafeAction::Kind::call, "bench.things[1]", "stop", "[]"});
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  bench.find("bench.things[1]");
-  HearingClient holder(bench.upstream);
-  take_lease(bench, bench.upstream, holder);
-  HearingClient other(bench.upstream);
-  device.put_thing("Part");
-  device.service->root().release("things", "1");
-  REQUIRE(bench.run_until([&] {
-    return ask_for_lease(bench, bench.upstream, other, rr::LockCommand::acquire_lease) ==
-           rr::ErrorCode::invalid_configuration;
-  }));
-  cut(bench, bench.upstream);
-  bench.open();
-  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
-}
-
-TEST_CASE("what is owed to a device is sent before the commands of a new holder") {
-  Counting device;
-  device.put_thing("Motor");
-  auto leases = leases_with_stop();
-  leases.safe.push_back({SafeAction::Kind::call, "bench.things[1]", "stop", "[]"});
-  UpstreamBench bench(device.service, leases);
-  bench.open();
-  bench.find("bench.things[1]");
-  HearingClient holder(bench.upstream);
-  take_lease(bench, bench.upstream, holder);
-  cut(bench, bench.upstream);
-  bench.open();  // and its objects are looked for still
-  take_lease(bench, bench.upstream, holder);
-  const auto sent = bench.ask(holder, rr::CallKind::poke_out, "bench", "wish", 0, {rr::Value(1.0)});
-  REQUIRE(bench.run_until([&] { return sent->has_value(); }));
-  CHECK((*sent)->has_value());
-  CHECK(device.commands.front() == "stop");
-}
-
-TEST_CASE("a session that rests is opened to make the device safe") {
-  Counting device;
-  UpstreamBench bench(device.service, leases_with_stop());
-  bench.upstream->rest_unused(50ms);
-  bench.upstream->keep_open({10ms, 20ms, 10s});
-  REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
-  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
-  REQUIRE(bench.wait_for(own->open()).has_value());
-  HearingClient holder(own);
-  take_lease(bench, own, holder);
-  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting(); }));
-  cut(bench, own);
-  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
-  CHECK(bench.run_until([&] { return bench.upstream->is_resting(); }));  // and no longer than that
-  own->close();
-}
-
-TEST_CASE("a session of nobody's makes nothing safe where the device wants users") {
-  Counting device;
-  rr::SecurityPolicy policy;
-  policy.authenticator = std::make_shared<Believing>();
-  policy.require_valid_user = true;
-  device.service->set_security(policy);
-  UpstreamBench bench(device.service, leases_with_stop());
-  bench.open();
-  REQUIRE(bench.upstream->requires_user());
-  const auto own =
-      std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{"alice", {}}, UpstreamUse::one_client);
-  REQUIRE(bench.wait_for(own->open()).has_value());
-  HearingClient holder(own);
-  take_lease(bench, own, holder);
-  cut(bench, own);
-  REQUIRE(bench.upstream->is_open());
-  CHECK(device.commands.empty());
-  REQUIRE(bench.wait_for(own->open()).has_value());
-  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
-  own->close();
 }
 
 TEST_CASE("a session that is held does not rest until it is let go") {
