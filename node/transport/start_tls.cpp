@@ -66,12 +66,12 @@ awaitable<Result<std::unique_ptr<ByteStream>>> start_tls_client(std::unique_ptr<
   const auto request = make_start_tls(target, context->has_certificate());
   if (const auto error = co_await write_all(plain, request); error)
     co_return make_error(ErrorCode::connection_error, "STARTTLS: " + error.message());
-  auto answer = co_await read_first(plain);
+  const auto answer = co_await read_first(plain);
   if (!limit.is_armed()) co_return late(plain, timeout);
   limit.disarm();
   if (!answer) {
-    answer.error().message = "STARTTLS: " + answer.error().message;
-    co_return answer.error();
+    const auto error = answer.error();
+    co_return make_error(error.code, "STARTTLS: " + error.message);
   }
   if (!answer->is_message) co_return protocol_error("STARTTLS: the peer does not speak Robot Raconteur");
   const auto reply = read_start_tls_reply(answer->bytes, target);
@@ -93,8 +93,8 @@ awaitable<Result<AcceptedStream>> accept_tls(std::unique_ptr<ByteStream> stream,
     auto first = co_await read_first(plain);
     if (!limit.is_armed()) co_return late(plain, options.timeout);
     if (!first) {
-      first.error().message = plain.peer() + ": " + first.error().message;
-      co_return first.error();
+      const auto error = first.error();
+      co_return make_error(error.code, plain.peer() + ": " + error.message);
     }
     auto request = first->is_message ? answer_first_request(first->bytes, options.self, options.context != nullptr)
                                      : Result<FirstRequest>(FirstRequest());

@@ -93,10 +93,10 @@ rr::DialOptions Device::dial_options(std::string_view way) const {
 rr::Result<> Device::load_tls() {
   for (const auto& files : {tls_, https_}) {
     if (!files) continue;
-    auto loaded = files->load();
+    const auto loaded = files->load();
     if (loaded) continue;
-    loaded.error().message = "device " + rr::quote(config_.name) + ": " + loaded.error().message;
-    return loaded;
+    const auto error = loaded.error();
+    return rr::make_error(error.code, "device " + rr::quote(config_.name) + ": " + error.message);
   }
   return {};
 }

@@ -285,6 +285,13 @@ def test_the_unit_starts_again_where_an_address_comes_late_and_not_where_the_con
     assert "listne" in said and status in given_up
 
 
+def test_a_ca_that_is_not_there_is_said_with_the_device_that_it_is_for(tmp_path):
+    device = {"name": "arm", "url": "rrs+tcp://127.0.0.1:1/?service=arm", "tls": {"ca": [str(tmp_path / "none.pem")]}}
+    (tmp_path / "gateway.json").write_text(json.dumps({"listen": ["127.0.0.1:0"], "devices": [device]}))
+    done = subprocess.run([str(RRGATE), "serve", tmp_path / "gateway.json"], capture_output=True, text=True, timeout=20)
+    assert done.returncode == 1 and "device 'arm': CA file" in done.stderr.replace("\\'", "'")
+
+
 @contextlib.contextmanager
 def handed(listener, folder, devices):
     """A gateway that is given a socket as systemd does it: number 3, and the process that it is for. (process, its log)"""

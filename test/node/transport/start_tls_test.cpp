@@ -140,7 +140,7 @@ TEST_CASE("STARTTLS: a client that gets no sensible answer", "[tls]") {
   }
   SECTION("the end") {
     meeting.streams.to_client->is_ended = true;
-    expected = "ended before a message was there";
+    expected = "STARTTLS: ended before a message was there";
   }
   SECTION("nothing") {
     expected = "no message within 2000 ms";
