@@ -186,6 +186,15 @@ const UrlScheme* find_url_scheme(std::string_view name) {
   return nullptr;
 }
 
+bool has_node_tls(const ConnectionUrl& url) {
+  const auto* scheme = find_url_scheme(url.scheme);
+  return scheme && scheme->is_secure;
+}
+
+bool has_https(const ConnectionUrl& url) {
+  return url.scheme.ends_with("+wss");
+}
+
 Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule) {
   if (text.size() > 4096) return bad_url(text.substr(0, 60), "longer than 4096 characters");
   for (const char c : text)

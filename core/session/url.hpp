@@ -41,6 +41,10 @@ struct ConnectionUrl {
   bool operator==(const ConnectionUrl&) const = default;
 };
 
+/// What the scheme says: TLS between nodes ("rrs"); HTTPS ("+wss") around that, or alone.
+bool has_node_tls(const ConnectionUrl& url);
+bool has_https(const ConnectionUrl& url);
+
 enum class ServiceInUrl { required, optional };
 
 /// Parses `text` in the form of section 1.1, or in the legacy form "tcp://host:port/<node>/service", which comes back

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "server/config/tls_files.hpp"
 
 namespace rrgate {
 

@@ -5,7 +5,6 @@
 
 #include "node/transport/schemes.hpp"
 #include "server/config/lease_options.hpp"
-#include "server/config/tls_files.hpp"
 
 namespace rrgate {
 

@@ -1,6 +1,5 @@
 #include "server/config/tls_files.hpp"
 
-#include "core/session/url.hpp"
 #include "node/platform/file_look.hpp"
 #include "node/tls/certificate_files.hpp"
 #include "server/log/log.hpp"
@@ -59,15 +58,6 @@ bool TlsFiles::reload() {
   else
     log(LogLevel::error, "TLS files can't be used; those from before stay in use", {{"error", loaded.error().message}});
   return loaded.has_value();
-}
-
-bool has_node_tls(const rr::ConnectionUrl& url) {
-  const auto* scheme = rr::find_url_scheme(url.scheme);
-  return scheme && scheme->is_secure;
-}
-
-bool has_https(const rr::ConnectionUrl& url) {
-  return url.scheme.ends_with("+wss");
 }
 
 std::shared_ptr<TlsFiles> make_device_tls(const DeviceConfig& device) {

@@ -48,10 +48,6 @@ class TlsFiles {
   rr::TlsContextPtr context_;
 };
 
-/// What a URL says: TLS between nodes; HTTPS around that, or alone.
-bool has_node_tls(const rr::ConnectionUrl& url);
-bool has_https(const rr::ConnectionUrl& url);
-
 /// For connections to a device: of TLS between nodes, and of HTTPS around that. Null where its URL wants none.
 std::shared_ptr<TlsFiles> make_device_tls(const DeviceConfig& device);
 std::shared_ptr<TlsFiles> make_device_https(const DeviceConfig& device);
