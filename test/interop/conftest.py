@@ -88,12 +88,15 @@ def pytest_collection_modifyitems(config, items):
 
 
 def group_of(item):
-    """Tests of a group run one after the other: those of a link, those with the network's namespaces, else a file's."""
+    """Tests of a group run one after the other: those with the network's namespaces, those of the one name that their
+    services have on this machine, those of a link, else a file's."""
     if "network" in item.fixturenames:
         return "network"
+    if item.get_closest_marker("local_name"):
+        return "local"
     if hasattr(item, "callspec") and "link" in item.callspec.params:
         direction, level = item.callspec.params["link"]
-        return f"{direction.name}-{level}"
+        return "local" if direction.route.endswith("local") else f"{direction.name}-{level}"
     return item.path.stem
 
 
