@@ -3,6 +3,10 @@
 namespace rr {
 
 void write_error(Message& message, const Error& error) {
+  write_error(message, error, TypeRegistry{});
+}
+
+void write_error(Message& message, const Error& error, const TypeRegistry& types) {
   auto& entry = message.entries.back();
   // A reply says either its result or its error: elements that were added before the failure go.
   message.elements.resize(entry.first_element);
@@ -15,7 +19,7 @@ void write_error(Message& message, const Error& error) {
   if (error.param) {
     const auto elements = message.elements.size();
     const auto kept = message.entries.back();
-    if (!pack_varvalue(message, "errorparam", *error.param, TypeRegistry{})) {
+    if (!pack_varvalue(message, "errorparam", *error.param, types)) {
       message.elements.resize(elements);
       message.entries.back() = kept;
     }

@@ -14,14 +14,19 @@ bool is_alnum(char c) {
 /// How one peer spells indexes; what it does once it always does.
 class Spelling {
  public:
-  bool has_capitals(bool now) { return agrees(capitals_, now); }  ///< %C3, not %c3
-  bool leaves_marks(bool now) { return agrees(marks_, now); }     ///< '-', '_' and '~' as they are
-  bool extends_sign(bool now) { return agrees(sign_, now); }      ///< %ffffffc3, not %c3
+  bool has_capitals(bool now) { return agrees(capitals_, now); }          ///< %C3, not %c3
+  bool has_capital_dots(bool now) { return agrees(dot_capitals_, now); }  ///< %2E; RobotRaconteurWeb has %C3 and %2e
+  bool leaves_marks(bool now) { return agrees(marks_, now); }             ///< '-', '_' and '~' as they are
+  bool extends_sign(bool now) { return agrees(sign_, now); }              ///< %ffffffc3, not %c3
 
  private:
-  static bool agrees(std::optional<bool>& known, bool now) { return known.value_or(now) == *(known = now); }
+  static bool agrees(std::optional<bool>& known, bool now) {
+    if (!known) known = now;
+    return *known == now;
+  }
 
   std::optional<bool> capitals_;
+  std::optional<bool> dot_capitals_;
   std::optional<bool> marks_;
   std::optional<bool> sign_;
 };
@@ -51,8 +56,12 @@ std::optional<std::string> decode_index(std::string_view text) {
     const char decoded = static_cast<char>(byte);
     if (is_alnum(decoded) || (is_mark(decoded) && !spelling.leaves_marks(false))) return std::nullopt;
     if (byte >= 0x80 && !spelling.extends_sign(is_sign_extended)) return std::nullopt;
-    for (const char digit : digits)
-      if (digit > '9' && !spelling.has_capitals(digit < 'a')) return std::nullopt;
+    for (const char digit : digits) {
+      if (digit <= '9') continue;
+      const bool is_capital = digit < 'a';
+      if (!(decoded == '.' ? spelling.has_capital_dots(is_capital) : spelling.has_capitals(is_capital)))
+        return std::nullopt;
+    }
     out += decoded;
     i += is_sign_extended ? 8 : 2;
   }

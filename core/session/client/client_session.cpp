@@ -19,6 +19,8 @@ constexpr std::chrono::milliseconds disconnect_timeout{500};
 constexpr std::chrono::seconds late_reply_period{60};
 
 bool is_reply(EntryType type) {
+  // RobotRaconteurWeb answers that an endpoint is closed with the request's own type. No service asks for it.
+  if (type == EntryType::pipe_disconnect_req) return true;
   const auto code = static_cast<std::uint16_t>(type);
   return code % 2 == 0 && code > 100 && type != EntryType::pipe_packet_ret && type != EntryType::wire_packet_ret;
 }

@@ -60,6 +60,7 @@ class HostedService {
 
   const std::string& name() const { return name_; }
   const TypeRegistry& types() const { return *types_; }
+  const std::shared_ptr<const TypeRegistry>& shared_types() const { return types_; }
   const EntityDefinition& root_type() const { return *root_type_; }
   const std::string& root_type_name() const { return root_->type_name(); }
   /// A MapString of numbers and texts.

@@ -76,7 +76,7 @@ void ServiceSession::refuse_pipe(PipeId id, const Error& error, Now now) {
   forget_pipe(id);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_connect_ret, key.path, key.member, request_id);
-  write_error(outgoing_, error);
+  write_own_error(error);
   send_outgoing(now);
 }
 

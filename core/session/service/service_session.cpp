@@ -179,7 +179,7 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
   }
   if (!written) {
     begin();
-    write_error(outgoing_, written.error());
+    write_own_error(written.error());
   }
   // Behind a gateway, where many share a link, no answer waits for a stream of values.
   send_outgoing(now, call.member->has_modifier("urgent") || service_->is_remote());
@@ -455,9 +455,16 @@ void ServiceSession::begin_reply(const MessageEntry& request) {
   outgoing_.begin_entry(reply_type(request.type), request.service_path, request.member_name, request.request_id);
 }
 
+void ServiceSession::write_own_error(const Error& error) {
+  if (service_)
+    write_error(outgoing_, error, service_->types());
+  else
+    write_error(outgoing_, error);
+}
+
 void ServiceSession::send_error(const MessageEntry& request, const Error& error, Now now) {
   begin_reply(request);
-  write_error(outgoing_, error);
+  write_own_error(error);
   send_outgoing(now, service_ && service_->is_remote());
 }
 

@@ -359,7 +359,7 @@ class ServiceSession {
                  const AuthenticatedUser* user) const;
   Result<> admit_special(const Message& message, const MessageEntry& entry) const;
   Error missing_service(std::string_view name) const;
-  const ServiceDefinition* find_definition(std::string_view service, std::string_view name) const;
+  std::shared_ptr<const ServiceDefinition> find_definition(std::string_view service, std::string_view name) const;
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
   bool refuse_reused_id(const MessageEntry& entry, Now now);
   void answer_pass(const MessageEntry& answer);
@@ -404,6 +404,8 @@ class ServiceSession {
   Result<> write_memory_reply(const OpenCall& call, const Value& value);
 
   void begin_reply(const MessageEntry& request);
+  /// What the application says, whose parameter may be of the service's types.
+  void write_own_error(const Error& error);
   void send_error(const MessageEntry& request, const Error& error, Now now);
   Result<> send_wire_packet(WireConnection& wire, WirePacket& packet, Now now);
   void flush_wires(Now now);

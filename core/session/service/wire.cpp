@@ -72,7 +72,7 @@ void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& 
   if (!result) end_wire(wire);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::wire_connect_ret, path, member.name, request_id);
-  if (!result) write_error(outgoing_, result.error());
+  if (!result) write_own_error(result.error());
   send_outgoing(now);
   flush_wires(now);
 }

@@ -276,6 +276,16 @@ TEST_CASE("the client closes an endpoint: both sides forget it") {
   CHECK(pair.client->pending_requests() == 0);
 }
 
+TEST_CASE("an endpoint is closed also where the answer has the type of the request, as RobotRaconteurWeb answers") {
+  Pipe pair;
+  const auto request = pair.client->disconnect_pipe("arm", "samples", pair.index, pair.now);
+  pair.lose_requests();
+  pair.forge(*pair.service,
+             [&](Message& message) { message.begin_entry(EntryType::pipe_disconnect_req, "arm", "samples", request); });
+  CHECK(pair.completion(request).value().is_null());
+  CHECK(pair.client->pending_requests() == 0);
+}
+
 TEST_CASE("the service closes an endpoint: the client is told, and its own close is good as well") {
   Pipe pair;
   SECTION("alone") {

@@ -70,6 +70,17 @@ TEST_CASE("functions take arguments and return values or errors") {
   REQUIRE(failed.param);
   CHECK(failed.param->to<std::int32_t>().value() == 3);
 
+  SECTION("what an error tells may be of the service's types") {
+    id = pair.client->call_function("arm", "jam", {}, pair.now);
+    pair.pump();
+    const Structure pose{"experimental.loopback.Pose",
+                         {{"x", Value(1.0)}, {"joints", Value(Array::take(std::vector<double>{2.0}))}}};
+    jammed.param = std::make_shared<const Value>(pose);
+    pair.service->reply(pair.next_service<Called>().id, jammed, pair.now);
+    const auto told = pair.completion(id).error().param;
+    REQUIRE(told);
+    CHECK(*told == Value(pose));
+  }
   SECTION("a handler's value that does not fit the definition is the caller's error, not silence") {
     id = pair.client->call_function("arm", "add", arguments, pair.now);
     pair.pump();
@@ -100,6 +111,50 @@ TEST_CASE("a reply without a call, a late one and a repeated one are ignored") {
   pair.pump();
   CHECK_FALSE(pair.client->poll_event());
   CHECK(pair.client->state() == ClientState::connected);
+}
+
+TEST_CASE("a definition that waits to be sent outlives its service") {
+  Loopback pair;
+  const auto text =
+      "service experimental.large\n# " + std::string(2 * EncodedMessage::gather_threshold, 'x') + "\nobject Arm\nend\n";
+  auto types = std::make_shared<TypeRegistry>();
+  types->add({text}, RobdefMode::strict).value();
+  const std::weak_ptr<const TypeRegistry> kept = types;
+  const auto root = std::make_shared<PlainObject>("experimental.large.Arm");
+  pair.directory.add(HostedService::make("large", root, std::move(types)).value()).value();
+  const auto ask = [&](bool by_type) {
+    pair.forge(*pair.client, [by_type](Message& message) {
+      message.begin_entry(EntryType::get_service_desc, "large", "", 7);
+      message.add_text("clientversion", "0.9.4");
+      if (by_type) message.add_text("ServiceType", "experimental.large");
+    });
+  };
+  SECTION("of the root") {
+    pair.lose_requests();
+    ask(false);
+  }
+  SECTION("by name") {
+    pair.lose_requests();
+    ask(true);
+  }
+  SECTION("with the login") {
+    ClientOptions options;
+    options.connection.self = {client_id, "test.client"};
+    options.service = "large";
+    pair.client = std::make_unique<ClientSession>(options, pair.now);
+    pair.carry(*pair.client, *pair.service, 1u << 20);  // the stream is agreed on first
+    pair.carry(*pair.service, *pair.client, 1u << 20);
+  }
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  pair.directory.remove("large");
+  pair.service->close_service(pair.now);
+
+  CHECK_FALSE(kept.expired());
+  Bytes bytes;
+  for (const auto slice : pair.service->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  CHECK(as_text(bytes).find(text) != std::string_view::npos);
+  pair.service->handle_transmitted(bytes.size(), pair.now);
+  CHECK(kept.expired());
 }
 
 TEST_CASE("events reach the client with their arguments") {

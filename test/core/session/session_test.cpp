@@ -347,11 +347,13 @@ TEST_CASE("few paths lead to one object, and all of them are released with it") 
   REQUIRE(find("arm.tools[a%2db%2ec]"));
   REQUIRE(find("arm.tools[a%2Db%2Ec]"));
   REQUIRE(find("arm.tools[a-b%2ec]"));
+  REQUIRE(find("arm.tools[%C3%A4%2e]"));  // as RobotRaconteurWeb spells it
   REQUIRE(find("arm.tools[%ffffffc3%ffffffa4]"));
   REQUIRE(find("arm.slots[-1]"));
   REQUIRE(find("arm.tool"));
   const auto asked = pair.root->asked.size();
-  for (const auto* path : {"arm.tools[a%2Db%2ec]", "arm.tools[a-b%2dc]", "arm.tools[%61]", "arm.tools[%ffffffc3%a4]"})
+  for (const auto* path :
+       {"arm.tools[%2D%2db]", "arm.tools[%2e%2E]", "arm.tools[a-b%2dc]", "arm.tools[%61]", "arm.tools[%ffffffc3%a4]"})
     CHECK(find(path).error().code == ErrorCode::service_error);
   for (const auto* path : {"arm.slots[01]", "arm.slots[-0]", "arm.slots[1a]", "arm.slots", "arm.tool[0]"})
     CHECK(find(path).error().code == ErrorCode::invalid_argument);
