@@ -5,7 +5,7 @@
 namespace rr {
 
 void DetectedNodes::handle_announcement(const Announcement& announcement, Now now, std::string_view sender) {
-  const NodeDiscoveryUrl heard{announcement.url, now.steady, now.utc};
+  const NodeDiscoveryUrl heard{announcement.url, now.steady};
   const auto expiry = now.steady + options_.expiry;
   next_expiry_ = std::min(next_expiry_.value_or(expiry), expiry);
 

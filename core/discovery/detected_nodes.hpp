@@ -19,7 +19,6 @@ namespace rr {
 struct NodeDiscoveryUrl {
   std::string url;  ///< of the service index
   TimePoint last_announce;
-  TimeSpec last_announce_utc;
 };
 
 /// What is known of a node. Nothing of it is proven.

@@ -16,9 +16,6 @@ namespace rr {
 /// node whose services come and go is not queried to death.
 class ServiceRefresh {
  public:
-  static constexpr std::chrono::milliseconds connect_timeout{15'000};  ///< for one query, up to the session
-  static constexpr std::chrono::milliseconds call_timeout{5'000};
-
   // --- told ---
 
   /// `nonce`  as announced; empty: the node has none, and is queried about once a minute.

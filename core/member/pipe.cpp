@@ -1,8 +1,7 @@
 #include "core/member/pipe.hpp"
 
-#include <charconv>
-
 #include "core/member/wire.hpp"
+#include "core/support/whole_number.hpp"
 
 namespace rr {
 
@@ -80,12 +79,10 @@ Result<SharedMessage*> SharedPipePacket::message(std::string_view path, const Me
 
 Result<std::int32_t> read_pipe_index(const MessageElement& element) {
   if (element.key_kind == KeyKind::number) return element.number;
-  std::int32_t index = 0;
-  const auto* end = element.name.data() + element.name.size();
-  const auto parsed = std::from_chars(element.name.data(), end, index);
-  if (element.key_kind != KeyKind::name || parsed.ec != std::errc{} || parsed.ptr != end)
+  const auto index = whole_number<std::int32_t>(element.name);
+  if (element.key_kind != KeyKind::name || !index)
     return protocol_error("pipe: element " + quote(element.name) + " does not name an endpoint");
-  return index;
+  return *index;
 }
 
 Result<PipePacket> read_pipe_packet_head(const Message& message, const MessageElement& element,

@@ -1,8 +1,8 @@
 // Unpacking of numbers, strings, arrays and containers; named types are in unpack_named.cpp.
 #include <algorithm>
-#include <charconv>
 
 #include "core/support/sort.hpp"
+#include "core/support/whole_number.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/pack.hpp"
 #include "core/types/unpacker.hpp"
@@ -238,8 +238,11 @@ bool Unpacker::read_key(const FieldPath& path, const MessageElement& element, st
   }
   // Version 2 and older writers of version 4 name the elements by decimal text.
   const auto text = element.name;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), key);
-  if (element.key_kind == KeyKind::name && error == std::errc() && end == text.data() + text.size()) return true;
+  const auto number = whole_number<std::int32_t>(text);
+  if (element.key_kind == KeyKind::name && number) {
+    key = *number;
+    return true;
+  }
   return fail(ErrorCode::data_type_error, path, "has the key " + quote(text) + ", expected an int32");
 }
 

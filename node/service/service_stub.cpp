@@ -1,6 +1,6 @@
 #include "node/service/service_stub.hpp"
 
-#include <charconv>
+#include "core/support/whole_number.hpp"
 
 namespace rr {
 
@@ -38,9 +38,7 @@ std::size_t ServiceStub::rr_broadcast(std::string_view pipe, const Value& packet
 }
 
 std::int32_t ServiceStub::rr_number(std::string_view text) {
-  std::int32_t number = 0;
-  const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (end.ec == std::errc() && end.ptr == text.data() + text.size()) return number;
+  if (const auto number = whole_number<std::int32_t>(text)) return *number;
   throw Exception(make_error(ErrorCode::invalid_argument, "index " + quote(text) + ": expected an int32"));
 }
 

@@ -1,9 +1,9 @@
 #include "server/access/api_tokens.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "core/support/hex.hpp"
+#include "core/support/whole_number.hpp"
 #include "core/support/words.hpp"
 #include "node/tls/digest.hpp"
 #include "server/access/access_text.hpp"
@@ -23,10 +23,7 @@ rr::Error unusable(std::string why) {
 
 /// Exactly `size` digits.
 std::optional<unsigned> number_of(std::string_view text, std::size_t size) {
-  unsigned out = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-  if (text.size() != size || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return out;
+  return text.size() == size ? rr::whole_number<unsigned>(text) : std::nullopt;
 }
 
 std::string padded(unsigned number, std::size_t digits) {

@@ -6,11 +6,12 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <charconv>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
 #include <string>
+
+#include "core/support/whole_number.hpp"
 
 namespace rrgate {
 
@@ -21,11 +22,7 @@ constexpr long most_sockets = 256;
 
 std::optional<long> number_in(const char* variable) {
   const char* text = std::getenv(variable);
-  long out = 0;
-  if (!text) return std::nullopt;
-  const auto [end, error] = std::from_chars(text, text + std::strlen(text), out);
-  if (error != std::errc() || *end != '\0') return std::nullopt;
-  return out;
+  return text ? rr::whole_number<long>(text) : std::nullopt;
 }
 
 /// A variable that names a process speaks to that one alone.

@@ -1,8 +1,9 @@
 #include "server/front/proxy_protocol.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
+
+#include "core/support/whole_number.hpp"
 
 namespace rrgate {
 
@@ -43,11 +44,9 @@ rr::Result<ProxyHeader> parse_line(std::string_view text) {
   if (error || source.is_v4() != (family == "TCP4")) return broken("its source is no address of its family");
   next_word(rest);  // where to
   const auto digits = next_word(rest);
-  std::uint16_t port = 0;
-  const auto [stop, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
-  if (digits.empty() || failure != std::errc() || stop != digits.data() + digits.size())
-    return broken("found port " + rr::quote(digits));
-  out.client = tcp::endpoint(source, port);
+  const auto port = rr::whole_number<std::uint16_t>(digits);
+  if (!port) return broken("found port " + rr::quote(digits));
+  out.client = tcp::endpoint(source, *port);
   return out;
 }
 

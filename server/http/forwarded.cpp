@@ -1,9 +1,9 @@
 #include "server/http/forwarded.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "core/session/url.hpp"
+#include "core/support/whole_number.hpp"
 #include "core/support/words.hpp"
 
 namespace rrgate {
@@ -175,10 +175,9 @@ std::optional<AddressRange> parse_address_range(std::string_view text) {
   const unsigned all = out.address.is_v4() ? 32 : 128;
   out.bits = all;
   if (slash == std::string_view::npos) return out;
-  const auto digits = text.substr(slash + 1);
-  const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), out.bits);
-  if (digits.empty() || failure != std::errc() || end != digits.data() + digits.size() || out.bits > all)
-    return std::nullopt;
+  const auto bits = rr::whole_number<unsigned>(text.substr(slash + 1));
+  if (!bits || *bits > all) return std::nullopt;
+  out.bits = *bits;
   // "10.0.0.1/8" is one host to some who write it and all of a network to others.
   const auto has_more = [&](const auto& bytes) {
     for (unsigned bit = out.bits; bit < all; ++bit)

@@ -1,10 +1,10 @@
 #include "server/json/numbers_from_json.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 
+#include "core/support/whole_number.hpp"
 #include "core/types/number.hpp"
 #include "node/tls/base64.hpp"
 #include "server/json/typed_array_tags.hpp"
@@ -32,14 +32,6 @@ std::string kind_of(const Json& json) {
     default:
       return "a number";
   }
-}
-
-/// Decimal digits in their one spelling: no sign but '-', no leading zero, no "-0".
-template <class Integer>
-bool parse_canonical(const std::string& text, Integer& out) {
-  const auto* end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data(), end, out);
-  return parsed.ec == std::errc() && parsed.ptr == end && std::to_string(out) == text;
 }
 
 }  // namespace
@@ -100,14 +92,12 @@ bool NumbersFromJson::read_scalar(const FieldPath& path, const Json& json, DataT
 }
 
 bool NumbersFromJson::read_wide(const FieldPath& path, const std::string& text, DataType type, Scalar& out) {
-  std::int64_t number = 0;
-  std::uint64_t large = 0;
-  if (type == DataType::int64_t && parse_canonical(text, number)) {
-    out = Scalar::of(number);
+  if (const auto number = canonical_number<std::int64_t>(text); number && type == DataType::int64_t) {
+    out = Scalar::of(*number);
     return true;
   }
-  if (type == DataType::uint64_t && parse_canonical(text, large)) {
-    out = Scalar::of(large);
+  if (const auto number = canonical_number<std::uint64_t>(text); number && type == DataType::uint64_t) {
+    out = Scalar::of(*number);
     return true;
   }
   return fail(

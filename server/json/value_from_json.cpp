@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/support/whole_number.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/type_text.hpp"
 #include "server/json/numbers_from_json.hpp"
@@ -73,7 +74,11 @@ class FromJson : public NumbersFromJson {
     return true;
   }
   bool read_key(const FieldPath& path, const std::string& key, std::int32_t& out) {
-    if (parse_canonical(key, out)) return true;
+    const auto number = canonical_number<std::int32_t>(key);
+    if (number) {
+      out = *number;
+      return true;
+    }
     return fail(ErrorCode::data_type_error, path,
                 "has the key " + rr::quote(key) + ", expected an int32 in plain decimal digits");
   }

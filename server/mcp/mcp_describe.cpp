@@ -1,11 +1,11 @@
 #include "server/mcp/mcp_describe.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <set>
 
 #include "core/support/utf8.hpp"
+#include "core/support/whole_number.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/json/schema.hpp"
 
@@ -156,9 +156,10 @@ std::string bounded_text(std::string_view text, std::size_t most) {
 
 McpPage page_of(std::size_t count, const std::string& cursor) {
   McpPage out;
-  const auto read = std::from_chars(cursor.data(), cursor.data() + cursor.size(), out.first);
-  if (!cursor.empty() && (read.ec != std::errc() || read.ptr != cursor.data() + cursor.size() || out.first > count))
+  const auto first = cursor.empty() ? std::optional<std::size_t>(0) : rr::whole_number<std::size_t>(cursor);
+  if (!first || *first > count)
     refuse(rr::ErrorCode::invalid_argument, "cursor is " + rr::quote(cursor) + ", expected the nextCursor of a list");
+  out.first = *first;
   out.last = std::min(count, out.first + page_items);
   if (out.last < count) out.next = std::to_string(out.last);
   return out;

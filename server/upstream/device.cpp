@@ -53,6 +53,13 @@ milliseconds around(milliseconds wait) {
   return rr::random_between(wait * 3 / 4, wait * 5 / 4);
 }
 
+/// What a reload may change of a device that goes on.
+void take_changeable(DeviceConfig& to, const DeviceConfig& from) {
+  to.max_clients = from.max_clients;
+  to.callbacks = from.callbacks;
+  to.shares_reads = from.shares_reads;
+}
+
 }  // namespace
 
 std::string_view to_string(DeviceState state) {
@@ -168,17 +175,13 @@ std::map<std::string, std::shared_ptr<ServiceLocks>> Device::locks() const {
 }
 
 bool Device::can_become(const DeviceConfig& config) const {
-  auto same = config;
-  same.max_clients = config_.max_clients;
-  same.callbacks = config_.callbacks;
-  same.shares_reads = config_.shares_reads;
-  return same == config_;
+  auto changed = config_;
+  take_changeable(changed, config);
+  return changed == config;
 }
 
 void Device::become(const DeviceConfig& config, const Config& whole) {
-  config_.max_clients = config.max_clients;
-  config_.callbacks = config.callbacks;
-  config_.shares_reads = config.shares_reads;
+  take_changeable(config_, config);
   dial_options_.timeout = whole.timeouts.connect;
   dial_options_.send_stall = whole.timeouts.send_stall;
   request_timeout_ = whole.timeouts.request;

@@ -50,7 +50,7 @@ class Device : public std::enable_shared_from_this<Device> {
   Traffic& traffic() { return traffic_; }
   const Traffic& traffic() const { return traffic_; }
 
-  /// Whether it goes on when this is what the configuration says of it; the bound on clients may differ.
+  /// Whether it goes on when this is what the configuration says of it. What become() takes may differ.
   bool can_become(const DeviceConfig& config) const;
   void become(const DeviceConfig& config, const Config& whole);
 

@@ -1,8 +1,8 @@
 #include "wasm-client/src/value_from_js.hpp"
 
-#include <charconv>
 #include <cmath>
 
+#include "core/support/whole_number.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/number.hpp"
 
@@ -208,9 +208,9 @@ bool FromJs::read_map_int32(const FieldPath& path, const JsValue& js, Value& out
     if (key.kind() == JsKind::text) {  // the keys of an object are text
       std::string text;
       if (!read_text(path, key, text)) return false;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-      if (error != std::errc() || end != text.data() + text.size() || std::to_string(number) != text)
-        return fail(ErrorCode::data_type_mismatch, path, "has the key " + quote(text) + ", expected an int32");
+      const auto said = canonical_number<std::int32_t>(text);
+      if (!said) return fail(ErrorCode::data_type_mismatch, path, "has the key " + quote(text) + ", expected an int32");
+      number = *said;
     } else {
       Scalar scalar;
       if (!read_scalar(path, key, DataType::int32_t, scalar)) return false;

@@ -1,7 +1,6 @@
 #include "core/session/service/hosted_service.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <set>
 #include <string>
 #include <utility>
@@ -9,20 +8,9 @@
 #include "core/robdef/model/names.hpp"
 #include "core/session/service/service_index.hpp"
 #include "core/session/service_path.hpp"
+#include "core/support/whole_number.hpp"
 
 namespace rr {
-
-namespace {
-
-/// Without leading zeros: two texts of one number would be two paths.
-bool is_decimal_int32(std::string_view text) {
-  std::int32_t number = 0;
-  const auto* end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data(), end, number);
-  return parsed.ec == std::errc{} && text == std::to_string(number);
-}
-
-}  // namespace
 
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
   const auto& type = objref.type;
@@ -31,7 +19,7 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
     return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' has no index");
   }
   if (!index) return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' needs an index");
-  if (type.container != ContainerKind::map_string && !is_decimal_int32(*index))
+  if (type.container != ContainerKind::map_string && !canonical_number<std::int32_t>(*index))
     return make_error(ErrorCode::invalid_argument,
                       "objref '" + objref.name + "': index " + quote(*index) + ": expected a decimal int32");
   return {};

@@ -1,8 +1,7 @@
 #include "server/http/endpoints/audit.hpp"
 
-#include <charconv>
-
 #include "core/session/url.hpp"
+#include "core/support/whole_number.hpp"
 #include "server/access/audit_tail.hpp"
 #include "server/http/endpoints/gateway_request.hpp"
 #include "server/http/response_writer.hpp"
@@ -32,9 +31,8 @@ rr::Result<AuditQuestion> read_question(std::string_view query) {
                          std::to_string(longest_audit_pattern));
   }
   if (const auto text = rr::query_value(query, "limit")) {
-    const auto* end = text->data() + text->size();
-    const auto read = std::from_chars(text->data(), end, out.limit);
-    if (read.ec != std::errc() || read.ptr != end || out.limit < 1 || out.limit > most_records)
+    out.limit = rr::whole_number<std::size_t>(*text).value_or(0);
+    if (out.limit < 1 || out.limit > most_records)
       return bad_request("limit is " + rr::quote(*text) + ", expected a whole number from 1 to " +
                          std::to_string(most_records));
   }

@@ -1,9 +1,9 @@
 #include "server/http/endpoints/leases.hpp"
 
 #include <boost/asio/post.hpp>
-#include <charconv>
 
 #include "core/support/random.hpp"
+#include "core/support/whole_number.hpp"
 #include "server/http/endpoints/refusal.hpp"
 #include "server/state/http_access.hpp"
 #include "server/upstream/lease_table.hpp"
@@ -17,11 +17,9 @@ constexpr std::size_t max_lease_holders = 256;
 
 milliseconds read_deadman(const ObjectRequest& request) {
   const auto text = request.option("deadman").value_or("");
-  std::int64_t number = 0;
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size())
-    refuse(rr::ErrorCode::invalid_argument, "deadman is " + rr::quote(text) + ", expected milliseconds");
-  return milliseconds(number);
+  const auto number = rr::whole_number<std::int64_t>(text);
+  if (!number) refuse(rr::ErrorCode::invalid_argument, "deadman is " + rr::quote(text) + ", expected milliseconds");
+  return milliseconds(*number);
 }
 
 /// The key of a client that holds the lease.

@@ -2,6 +2,7 @@
 
 #include <charconv>
 
+#include "core/support/whole_number.hpp"
 #include "core/types/multidim.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
@@ -110,13 +111,8 @@ std::optional<ByteRange> read_range(std::string_view header, std::uint64_t size,
   header.remove_prefix(unit.size());
   const auto dash = header.find('-');
   if (dash == std::string_view::npos) return std::nullopt;
-  const auto number = [](std::string_view text) {
-    std::uint64_t out = 0;
-    const auto read = std::from_chars(text.data(), text.data() + text.size(), out);
-    return read.ec == std::errc() && read.ptr == text.data() + text.size() ? std::optional(out) : std::nullopt;
-  };
-  const auto first = number(header.substr(0, dash));
-  const auto last = number(header.substr(dash + 1));
+  const auto first = rr::whole_number<std::uint64_t>(header.substr(0, dash));
+  const auto last = rr::whole_number<std::uint64_t>(header.substr(dash + 1));
   ByteRange out;
   if (first && (last || dash + 1 == header.size())) {
     out = {*first, std::min(last.value_or(size - 1), size - 1)};
