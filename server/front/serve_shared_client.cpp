@@ -76,19 +76,25 @@ bool is_command(const rr::MemberAccess& wanted) {
           wanted.type == rr::EntryType::wire_poke_out_value_req);
 }
 
-/// An emergency stop, and the like, or the end of a lease: it passes where others are refused because there were too
-/// many.
-bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
-  if (!is_command(wanted)) return false;
+/// Of an emergency stop, and the like, or the end of a lease.
+bool is_of_urgent_member(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
+  if (!wanted.member) return false;
   if (device_name == gateway_device) return wanted.member->name == "release_lease";
   const auto* device = gateway.devices().find(device_name);
   return device && device->config().leases.is_urgent(std::string(wanted.path) + "." + wanted.member->name);
 }
 
-/// See AccessRequest.
+/// It passes where others are refused because there were too many.
+bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
+  return is_command(wanted) && is_of_urgent_member(gateway, device_name, wanted);
+}
+
+/// See AccessRequest. Asked only where what can't be recorded is not done: packets of streams come here, too.
 bool is_vital(GatewayState& gateway, const SharedNode& node, const rr::MemberAccess& wanted) {
+  if (!gateway.access().state().config.audit.fails_closed) return false;
   const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-  return is_urgent(gateway, device, wanted) || (device == gateway_device && wanted.member->name == "renew_lease");
+  if (device == gateway_device && wanted.member && wanted.member->name == "renew_lease") return true;
+  return is_of_urgent_member(gateway, device, wanted);
 }
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
@@ -149,7 +155,7 @@ auto make_admission(GatewayState& gateway, const SharedNode& node, std::string p
           seating = std::move(seating)](const rr::MemberAccess& wanted) -> rr::Result<> {
     const bool connects =
         wanted.type == rr::EntryType::connect_client || wanted.type == rr::EntryType::connect_client_combined;
-    auto allowed = rights->admit(wanted, is_command(wanted) && is_vital(gateway, node, wanted));
+    auto allowed = rights->admit(wanted, is_vital(gateway, node, wanted));
     if (!connects) return allowed;
     if (!allowed)
       gateway.reject(allowed.error());

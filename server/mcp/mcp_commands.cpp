@@ -188,7 +188,7 @@ AgentTerms McpTools::judge(const Command& command) {
     refuse(rr::ErrorCode::permission_denied,
            "a person has stopped all agents; nothing is commanded until that is over");
   const auto what = command.wanted.what();
-  const auto allowed = standing_.check(what);
+  const auto allowed = standing_.check(access_request(*command.target, command.wanted.verb));
   if (!allowed) {
     gateway_.reject(allowed.error());
     throw rr::Exception(allowed.error());

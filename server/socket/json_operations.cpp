@@ -270,8 +270,6 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
 AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
   auto wanted = access_request(target, operation.verb);
   wanted.is_shape = operation.traits.asks_shape;
-  wanted.is_vital =
-      target.member && place_.device->config().leases.is_urgent(target.path() + "." + target.member->name);
   if (operation.traits.gives_back && target.client->has_lock(target.path()))
     return operation.traits.recorded == Recorded::never ? nullptr : place_.standing->begin(wanted, operation.name);
   auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,

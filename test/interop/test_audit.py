@@ -331,7 +331,8 @@ def limit_files(site, size):
 
 @pytest.mark.parametrize("is_closed", [False, True])
 def test_a_disk_that_is_full_and_has_room_again(device, node, tmp_path, is_closed):
-    site = Site(tmp_path, device, {"fail_closed": is_closed}, {"members": [{"member": "interop.p_int8", "lease": "never"}]},
+    never = [{"member": f"interop.{name}", "lease": "never"} for name in ("p_int8", "target")]
+    site = Site(tmp_path, device, {"fail_closed": is_closed}, {"members": never},
                 command=["env", "--ignore-signal=XFSZ"])
     login = ("root", {"password": RR.VarValue(PASSWORDS["root"], "string")}, None, None)
     arm = node.ConnectService(site.url("rr+tcp"), *login)
@@ -369,6 +370,7 @@ def test_a_disk_that_is_full_and_has_room_again(device, node, tmp_path, is_close
                 arm.p_double = 2.5
         # What stops something, keeps a lease or gives it back, is done in any case.
         arm.p_int8 = 1
+        arm.target.Connect().OutValue = 1.0
         assert ask(site.port, "PUT", BASE + "/p_int8", 2, bearer(site.token)).status == 204
         with Socket(site.port, additional_headers=bearer(site.token)) as page:
             assert page.ask("set", "p_int8", value=3) is None

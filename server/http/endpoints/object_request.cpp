@@ -108,9 +108,13 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayStat
 
 AccessRequest access_request(const Target& target, Verb verb) {
   const auto& upstream = *target.client->upstream();
-  const auto member = target.member ? std::string_view(target.member->name) : std::string_view();
-  return {upstream.device().config().name,      upstream.service(), target.path(), member, verb,
-          target.is_shape && verb == Verb::read};
+  const auto& device = upstream.device().config();
+  AccessRequest out{.device = device.name, .service = upstream.service(), .path = target.path(), .verb = verb};
+  if (!target.member) return out;
+  out.member = target.member->name;
+  out.is_shape = target.is_shape && verb == Verb::read;
+  out.is_vital = device.leases.is_urgent(target.path() + "." + target.member->name);
+  return out;
 }
 
 rr::JsonForm json_form(const Request& request) {

@@ -284,7 +284,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   const bool needs_right = target && !releases_own_lease(request, *target);
   if (target) {
     auto wanted = access_request(*target, verb_of(request, *target));
-    wanted.is_vital = is_urgent || (!target->member && request.option("lease") == "renew");
+    if (!target->member && request.option("lease") == "renew") wanted.is_vital = true;
     auto who = writer.request().identity;
     if (wanted.verb == Verb::subscribe) who.face = Face::stream;
     const auto event = lease_event(request, *target);
