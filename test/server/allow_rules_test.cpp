@@ -15,7 +15,6 @@ rr::NodeDiscoveryInfo node_at(const std::vector<std::string>& addresses, const s
   for (const auto& address : addresses)
     node.urls.push_back({"rr+tcp://" + address + "/?nodeid=" + rr::format_node_id(id, rr::NodeIdFormat::dashes) +
                              "&service=RobotRaconteurServiceIndex",
-                         {},
                          {}});
   return node;
 }
@@ -95,7 +94,7 @@ TEST_CASE("a rule by name and service type asks anywhere, but only who has the n
 
 TEST_CASE("a node without a URL that can be dialed is allowed, but is no device") {
   auto node = node_at({});
-  node.urls.push_back({"rr+pci:///?nodeid=01020300-0000-0000-0000-000000000000&service=x", {}, {}});
+  node.urls.push_back({"rr+pci:///?nodeid=01020300-0000-0000-0000-000000000000&service=x", {}});
   node.urls.back().url = "rr+bluetooth:///?nodeid=01020300-0000-0000-0000-000000000000&service=x";
   const auto verdict = judge({{"*", {}, ""}}, node, nullptr);
   CHECK(verdict.is_allowed);
