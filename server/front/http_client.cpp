@@ -385,9 +385,9 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   auto headers = is_foreign ? std::vector<std::pair<std::string, std::string>>() : headers_for_page(request);
   if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
     headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-  if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));
   ResponseOptions options{.closes = gateway.is_stopping(),
                           .headers = std::move(headers),
+                          .cookie = [&] { return gateway.http_access().renewed_cookie(request); },
                           .patience = config.timeouts.send_stall,
                           .is_vital = !makes_work(request),
                           .is_urgent = is_urgent,

@@ -35,6 +35,9 @@ std::string ResponseWriter::head_of(const Response& response) const {
   whole.status = response.status;
   whole.headers = response.headers;
   whole.headers.insert(whole.headers.end(), headers_.begin(), headers_.end());
+  const auto sets_cookie = [](const auto& header) { return header.first == "Set-Cookie"; };
+  if (cookie_ && std::ranges::none_of(whole.headers, sets_cookie))
+    if (auto cookie = cookie_(); !cookie.empty()) whole.set("Set-Cookie", std::move(cookie));
   whole.body = response.body;
   whole.is_streamed = is_streamed_;
   return format_response_head(whole, goes_on(), minor_version());

@@ -18,6 +18,8 @@ namespace rrgate {
 struct ResponseOptions {
   bool closes = false;                                            ///< the connection, in any case
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< of every response of this connection
+  /// Set-Cookie of a response that sets none itself, asked for when its head is written. Empty, or returns "": none.
+  std::function<std::string()> cookie = {};
   /// For each part of a response, beside what least_rate gives for its bytes. Who reads slower is cut.
   std::chrono::milliseconds patience{15'000};
   bool is_vital = false;       ///< answered also when there is no memory left
@@ -43,6 +45,7 @@ class ResponseWriter {
         is_urgent_(options.is_urgent),
         metrics_(options.metrics),
         headers_(std::move(options.headers)),
+        cookie_(std::move(options.cookie)),
         patience_(options.patience),
         slow_(stream.executor(), [this] { stream_.close(); }) {}
 
@@ -116,6 +119,7 @@ class ResponseWriter {
   Metrics* metrics_;
   std::chrono::steady_clock::time_point is_whole_ = std::chrono::steady_clock::now();  ///< the request
   std::vector<std::pair<std::string, std::string>> headers_;
+  std::function<std::string()> cookie_;
   std::chrono::milliseconds patience_;
   rr::Deadline slow_;
   std::function<void(unsigned status)> on_begin_;

@@ -193,9 +193,6 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   }
   request.identity = std::move(*identity);
   if (request.identity.is_proven()) {
-    if (!request.identity.sign_in.empty())
-      if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
-        out.cookie = format_sign_in_cookie(request.arrival, *next);
     out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                             std::chrono::steady_clock::now());
     if (!out.user && request.too_much.empty()) request.too_much = "of " + rr::quote(request.identity.name);
@@ -203,6 +200,12 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   if (!request.too_much.empty() && !(passes && passes(request.identity)))
     out.refusal = refuse_too_much(request.identity, nullptr, request.too_much);
   co_return out;
+}
+
+std::string HttpAccess::renewed_cookie(const Request& request) const {
+  if (request.identity.sign_in.empty()) return {};
+  const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now());
+  return next ? format_sign_in_cookie(request.arrival, *next) : std::string();
 }
 
 std::optional<RateGate::Pass> HttpAccess::enter_device(const std::string& device, const Rates& rates) {

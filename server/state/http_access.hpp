@@ -49,12 +49,14 @@ class HttpAccess {
     std::optional<RateGate::Pass> client = {};
     std::optional<RateGate::Pass> user = {};
     std::optional<Response> refusal = {};
-    std::string cookie = {};  ///< to go on with, for Set-Cookie; empty: the one that was shown, or none
   };
   /// Finds out who sends a request, and whether he asks for too much; both are noted in it.
   /// `passes`  whether it goes through though it be too much, by who sends it; empty: for nobody.
   rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config,
                                 std::function<bool(const Identity&)> passes);
+  /// Set-Cookie that takes the sign-in further by which the request was admitted. Empty: there is none, it has ended
+  /// meanwhile, or its cookie is good for long still.
+  std::string renewed_cookie(const Request& request) const;
   std::optional<RateGate::Pass> enter_device(const std::string& device, const Rates& rates);
   /// Refuses it, which is recorded. `of`  as in Request::too_much.
   Response refuse_too_much(const Identity& who, const AccessRequest* what, const std::string& of);

@@ -12,12 +12,18 @@ namespace {
 
 const std::string own_page = "Origin: http://localhost:8080\r\n";
 
-/// A gateway with one token, "ci".
+/// A gateway with the tokens "ci" and "bob".
 struct Guarded {
   Folder files;
+  std::string key = "a key of thirty-two bytes or more";
   std::string token = make_api_token();
+  std::string token_of_bob = make_api_token();
   std::string line = "ci " + hash_api_token(token) + " admin _\n";
-  TestGateway gateway{1, [this](Config& config) { config.access.tokens_file = files.write("tokens", line); }};
+  TestGateway gateway{1, [this](Config& config) {
+                        config.access.tokens_file =
+                            files.write("tokens", line + "bob " + hash_api_token(token_of_bob) + " viewer _\n");
+                        config.access.ticket_key_file = files.write("key", key);
+                      }};
 
   TestClient::HttpResponse ask(const std::string& first, const std::string& lines = {}, const std::string& body = {}) {
     TestClient client(gateway.port());
@@ -33,6 +39,16 @@ struct Guarded {
     const auto head = sign_in(R"({"token": ")" + token + "\"}").head;
     const auto begin = head.find("Set-Cookie: rrgate-8080=") + 12;
     return "Cookie: " + head.substr(begin, head.find(';', begin) - begin) + "\r\n";
+  }
+  /// One of "ci", of which more than half the time is over.
+  std::string old_cookie() const {
+    Identity who;
+    who.name = "ci";
+    who.roles = who.proven_roles = {"admin"};
+    who.proof = Proof::token;
+    who.credential = hash_api_token(token);
+    const auto long_ago = std::chrono::system_clock::now() - SignIns::lifetime / 2 - std::chrono::minutes(1);
+    return "Cookie: rrgate-8080=" + SignIns(rr::Bytes(key.begin(), key.end())).begin(who, long_ago).value() + "\r\n";
   }
   /// Whom the gateway takes a request for.
   nlohmann::json who(const std::string& lines) {
@@ -115,6 +131,31 @@ TEST_CASE("signing out: no cookie of the sign-in is taken any more, and what wen
   CHECK(guarded.who(other) == "ci");
   CHECK_NOTHROW(socket.receive_all());
   CHECK(guarded.ask("DELETE /api/v1/session", cookie + own_page).status == 204);
+}
+
+TEST_CASE("a response renews a cookie when half its time is over, unless it sets another one, or takes it away") {
+  Guarded guarded;
+  const auto cookie = guarded.old_cookie();
+  const auto cookies_of = [](const TestClient::HttpResponse& answer) {
+    std::vector<std::string> out;
+    const std::string name = "Set-Cookie: ";
+    for (auto at = answer.head.find(name); at != std::string::npos; at = answer.head.find(name, at + 1))
+      out.push_back(answer.head.substr(at + 12, answer.head.find(';', at) - at - 12));
+    return out;
+  };
+  const auto who_has = [&](const std::string& set) { return guarded.who("Cookie: " + set + "\r\n"); };
+  const auto renewed = cookies_of(guarded.ask("GET /api/v1/access", cookie));
+  REQUIRE(renewed.size() == 1);
+  CHECK(who_has(renewed[0]) == "ci");
+
+  const auto signed_in =
+      cookies_of(guarded.sign_in(R"({"token": ")" + guarded.token_of_bob + "\"}", cookie + own_page));
+  REQUIRE(signed_in.size() == 1);
+  CHECK(who_has(signed_in[0]) == "bob");
+
+  const auto signed_out = guarded.ask("DELETE /api/v1/session", cookie + own_page);
+  CHECK(cookies_of(signed_out) == std::vector<std::string>{"rrgate-8080="});
+  CHECK(who_has(renewed[0]).is_null());
 }
 
 TEST_CASE("a sign-in ends when what was shown is good no more") {

@@ -3,6 +3,7 @@
 
 #include "test/node/node/node_fixture.hpp"
 #include "test/server/support/test_gateway.hpp"
+#include "test/support/folder.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;
@@ -99,4 +100,37 @@ TEST_CASE("clients of a shared device that read a property at once are one read 
   std::sort(values.begin(), values.end());
   CHECK(values == (shares_reads ? std::vector{1, 1, 1} : std::vector{1, 2, 3}));
   CHECK(clients.front().get("slow_level") == rr::Value(shares_reads ? 2 : 4));  // the next one is asked for anew
+}
+
+TEST_CASE("a request that was at work when its sign-in ended is answered, and gives no cookie back") {
+  SlowDevice device;
+  const Folder files;
+  const std::string key = "a key of thirty-two bytes or more";
+  const auto token = make_api_token();
+  TestGateway gateway(0, [&](Config& config) {
+    device.behind(DeviceMode::shared)(config);
+    config.access.tokens_file = files.write("tokens", "ci " + hash_api_token(token) + " admin _\n");
+    config.access.ticket_key_file = files.write("key", key);
+  });
+  gateway.wait_for("/readyz", [](const auto& ready) { return ready["devices_online"] == 1; });
+  Identity who;
+  who.name = "ci";
+  who.roles = who.proven_roles = {"admin"};
+  who.proof = Proof::token;
+  who.credential = hash_api_token(token);
+  const auto long_ago = std::chrono::system_clock::now() - SignIns::lifetime / 2 - 1min;
+  const auto cookie = SignIns(rr::Bytes(key.begin(), key.end())).begin(who, long_ago).value();
+  const auto lines = " HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\nCookie: rrgate=" + cookie + "\r\n";
+  TestClient slow(gateway.port());
+  slow.send("POST /api/v1/devices/slow/Slow/block" + lines +
+            "Content-Type: application/json\r\nContent-Length: 13\r\n\r\n{\"number\": 7}");
+  const bool has_entered = device.entered.get_future().wait_for(10s) == std::future_status::ready;
+  TestClient other(gateway.port());
+  other.send("DELETE /api/v1/session" + lines + "\r\n");
+  CHECK(other.receive_response(false).status == 204);
+  device.released.set_value();
+  REQUIRE(has_entered);
+  const auto answer = slow.receive_response();
+  CHECK(answer.status == 200);
+  CHECK_THAT(answer.head, !Catch::Contains("Set-Cookie"));
 }
