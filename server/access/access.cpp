@@ -187,22 +187,26 @@ rr::Result<> Access::replace(AccessStatePtr next) {
 }
 
 void Access::record_tokens(const AccessState& before, const AccessState& now) {
-  const auto names = [](const AccessState& state) {
-    return state.tokens ? state.tokens->names() : std::map<std::string, std::vector<std::string>>();
-  };
-  const auto old = names(before);
-  const auto current = names(now);
-  const auto tell = [this](std::string_view event, const std::string& name, const std::vector<std::string>& roles) {
-    const auto detail = name + ": roles " + format_roles(roles);
+  const ApiTokens none;
+  const auto& old = (before.tokens ? *before.tokens : none).by_hash();
+  const auto& current = (now.tokens ? *now.tokens : none).by_hash();
+  const auto tell = [this](std::string_view event, const ApiTokens::Entry& of) {
+    const auto until = of.last_day ? ", until " + format_day(*of.last_day) : std::string();
+    const auto detail = of.name + ": roles " + format_roles(of.roles) + until;
     record({.event = event, .detail = detail});
   };
-  for (const auto& [name, roles] : old)
-    if (!current.contains(name)) tell("token_revoked", name, roles);
-  for (const auto& [name, roles] : current)
-    if (const auto found = old.find(name); found == old.end())
-      tell("token_made", name, roles);
-    else if (found->second != roles)
-      tell("token_changed", name, roles);
+  // The hash is the token: a name may be that of several, and of another one tomorrow.
+  const auto is_in = [](const ApiTokens::Entries& entries, const auto& token) {
+    const auto found = entries.find(token.first);
+    return found != entries.end() && found->second.name == token.second.name;
+  };
+  for (const auto& token : old)
+    if (!is_in(current, token)) tell("token_revoked", token.second);
+  for (const auto& token : current)
+    if (!is_in(old, token))
+      tell("token_made", token.second);
+    else if (old.find(token.first)->second != token.second)
+      tell("token_changed", token.second);
 }
 
 void Access::record_users(const AccessState& before, const AccessState& now) {

@@ -105,12 +105,6 @@ rr::Result<Identity> ApiTokens::verify(std::string_view token, std::chrono::syst
   return std::move(*found);
 }
 
-std::map<std::string, std::vector<std::string>> ApiTokens::names() const {
-  std::map<std::string, std::vector<std::string>> out;
-  for (const auto& [hash, entry] : by_hash_) out.emplace(entry.name, entry.roles);
-  return out;
-}
-
 std::optional<Identity> ApiTokens::find(std::string_view credential, std::chrono::system_clock::time_point now) const {
   const auto found = by_hash_.find(credential);
   if (found == by_hash_.end()) return std::nullopt;

@@ -28,18 +28,21 @@ class ApiTokens {
   /// By the identity's credential. nullopt: as above.
   std::optional<Identity> find(std::string_view credential, std::chrono::system_clock::time_point now) const;
   std::size_t size() const { return by_hash_.size(); }
-  /// With their roles.
-  std::map<std::string, std::vector<std::string>> names() const;
 
- private:
   struct Entry {
     std::string name;
     std::vector<std::string> roles;
     std::optional<std::chrono::sys_days> last_day;
+
+    bool operator==(const Entry&) const = default;
   };
+  using Entries = std::map<std::string, Entry, std::less<>>;
+  const Entries& by_hash() const { return by_hash_; }
+
+ private:
   rr::Result<> add_line(std::string_view line);
 
-  std::map<std::string, Entry, std::less<>> by_hash_;
+  Entries by_hash_;
 };
 
 /// A new one: "rrg_" and 256 random bits.

@@ -314,6 +314,44 @@ TEST_CASE("tokens that are made and revoked are recorded when their file is read
   CHECK(lines[1]["detail"] == "new: roles viewer,operator");
 }
 
+TEST_CASE(
+    "a token is known by its hash in the audit log: another one of the same name, other roles, another last day") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  const auto line = [](const std::string& name, const std::string& secret, const std::string& rest) {
+    return name + " " + hash_api_token(secret) + " " + rest + "\n";
+  };
+  const auto same = line("same", "s", "viewer _");
+  const auto cell = line("cell", "a", "viewer _");
+  files.write("tokens", same + cell);
+  auto config = with_users(files);
+  config.tokens_file = files.path("tokens");
+  Access access(config);
+  REQUIRE(access.load());
+  std::size_t seen = 0;
+  const auto change_to = [&](const std::string& text) {
+    files.write("tokens", same + text);
+    access.reload(true);
+    std::vector<std::string> out;
+    const auto lines = files.audit(access);
+    for (; seen < lines.size(); ++seen)
+      out.push_back(lines[seen]["event"].get<std::string>() + " " + lines[seen]["detail"].get<std::string>());
+    return out;
+  };
+  using Records = std::vector<std::string>;
+  CHECK(change_to(cell + line("cell", "b", "operator _")) == Records{"token_made cell: roles operator"});
+  CHECK(change_to(line("cell", "b", "operator _")) == Records{"token_revoked cell: roles viewer"});
+  CHECK(change_to(line("cell", "c", "operator _")) ==
+        Records{"token_revoked cell: roles operator", "token_made cell: roles operator"});
+  CHECK(change_to(line("cell", "c", "viewer _")) == Records{"token_changed cell: roles viewer"});
+  CHECK(change_to(line("cell", "c", "viewer 2100-01-31")) ==
+        Records{"token_changed cell: roles viewer, until 2100-01-31"});
+  CHECK(
+      change_to(line("hall", "c", "viewer 2100-01-31")) ==
+      Records{"token_revoked cell: roles viewer, until 2100-01-31", "token_made hall: roles viewer, until 2100-01-31"});
+  CHECK(change_to(line("hall", "c", "viewer 2100-01-31")).empty());
+}
+
 TEST_CASE("users that come, go or change are recorded when their file is read anew, without passwords") {
   Files files;
   const auto bob = Files::user("bob", "one", "viewer");
