@@ -28,6 +28,14 @@ void AccessRequests::forget_old(Time now) {
 
 bool AccessRequests::make_room(const std::string& site) {
   if (entries_.size() < max_requests) return true;
+  auto denied = entries_.end();
+  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry)
+    if (const auto& request = entry->second.request; request.state == RequestState::denied)
+      if (denied == entries_.end() || request.asked < denied->second.request.asked) denied = entry;
+  if (denied != entries_.end()) {
+    entries_.erase(denied);
+    return true;
+  }
   struct Share {
     std::size_t count = 0;
     std::string oldest = {};

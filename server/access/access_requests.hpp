@@ -25,8 +25,8 @@ struct RequestOfAccess {
   std::chrono::system_clock::time_point asked;
 };
 
-/// Few at a time, and each for an hour. Where there are so many that no other fits, a site that has more of them than
-/// the one that asks would have gives up its oldest.
+/// Few at a time, and each for an hour. Where there are so many that no other fits, the oldest that was denied gives
+/// way; where none was, a site that has more that wait than the one that asks would have gives up its oldest.
 class AccessRequests {
  public:
   using Time = std::chrono::system_clock::time_point;
@@ -61,7 +61,8 @@ class AccessRequests {
     std::string token;
   };
   void forget_old(Time now);
-  /// Whether there is room for one more of this site, now that the oldest of another may have gone.
+  /// Whether there is room for one more of this site, now that one that was denied, or the oldest of another site, may
+  /// have gone.
   bool make_room(const std::string& site);
 
   static constexpr std::size_t max_requests = 100;

@@ -315,3 +315,36 @@ TEST_CASE("requests of access: who asks for much takes the places of nobody else
   CHECK(has("late4"));
   CHECK_FALSE(has("n0"));
 }
+
+TEST_CASE("requests of access: those that were denied make room, approved ones wait for their client") {
+  AccessRequests requests;
+  const auto ask = [&](int number, int after) {
+    return requests.ask("n", "", "c", "192.0.2." + std::to_string(number), day + seconds(after));
+  };
+  const auto approved = ask(0, 0).value();
+  std::vector<AccessRequests::Asked> flood;
+  for (int i = 0; i < 99; ++i) flood.push_back(ask(1 + i, 1 + i).value());
+  CHECK_FALSE(ask(200, 100));
+  requests.decide(approved.id, "rrg_token");
+  for (const auto& each : flood) requests.decide(each.id, "");
+  for (int i = 0; i < 99; ++i) CHECK(ask(100 + i, 100 + i));
+  CHECK_FALSE(ask(200, 200));
+  CHECK_FALSE(requests.claim(flood.front().id, flood.front().secret, day + seconds(200)));
+  CHECK(requests.claim(approved.id, approved.secret, day + seconds(200))->token == "rrg_token");
+}
+
+TEST_CASE("requests of access: of those that were denied the oldest gives way") {
+  AccessRequests requests;
+  std::vector<AccessRequests::Asked> asked;
+  for (int i = 0; i < 100; ++i)
+    asked.push_back(requests.ask("n", "", "c", "192.0.2." + std::to_string(i), day + seconds(i)).value());
+  for (const auto number : {70, 30, 50}) requests.decide(asked[number].id, "");
+  CHECK(requests.ask("n", "", "c", "198.51.100.1", day + seconds(200)));
+  const auto is_there = [&](std::size_t number) {
+    return requests.claim(asked[number].id, asked[number].secret, day + seconds(200)).has_value();
+  };
+  CHECK_FALSE(is_there(30));
+  CHECK(is_there(50));
+  CHECK(is_there(70));
+  CHECK(is_there(0));
+}
