@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 namespace rrgate {
@@ -43,15 +44,14 @@ Tail read_tail(const std::string& path, std::uint64_t size) {
   return {text.substr(first, end - first), begin + end + 1};
 }
 
-AuditChain read_head(int file) {
+/// nullopt: there is none, or nothing in it.
+std::optional<AuditChain> read_head(int file) {
   char text[128] = {};
-  AuditChain out;
   unsigned long long seq = 0;
   char hash[65] = {};
-  if (::pread(file, text, sizeof(text) - 1, 0) <= 0 || std::sscanf(text, "%20llu %64s", &seq, hash) != 2) return out;
-  out.seq = seq;
-  out.hash = hash;
-  return out;
+  if (file < 0 || ::pread(file, text, sizeof(text) - 1, 0) <= 0 || std::sscanf(text, "%20llu %64s", &seq, hash) != 2)
+    return std::nullopt;
+  return AuditChain{seq, hash};
 }
 
 }  // namespace
@@ -121,12 +121,15 @@ void AuditFile::find_chain() {
   }
   const auto last = parse_audit_line(tail.line);
   if (last) chain_ = {last->seq, last->hash};
-  const auto head = head_ >= 0 ? read_head(head_) : AuditChain();
-  const bool was_cut = head.seq > chain_.seq || (head.seq == chain_.seq && head.seq != 0 && head != chain_);
+  const auto head = read_head(head_);
+  const bool was_cut =
+      head && (head->seq > chain_.seq || (head->seq == chain_.seq && head->seq != 0 && *head != chain_));
   if (was_cut) {
-    found_ = "the file ends with record " + std::to_string(chain_.seq) + ", but " + std::to_string(head.seq) +
+    found_ = "the file ends with record " + std::to_string(chain_.seq) + ", but " + std::to_string(head->seq) +
              " were written: its end was cut off, or another file is there";
-    chain_ = head;
+    chain_ = *head;
+  } else if (last && !head) {
+    found_ = config_.file + ".head is missing: the end of the file may have been cut off";
   } else if (last && last->text.find(",\"event\":\"stopped\"") == std::string_view::npos && found_.empty()) {
     found_ = "the gateway before was killed, or the end of the file was cut off: there is no \"stopped\"";
   }

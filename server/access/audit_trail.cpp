@@ -102,6 +102,13 @@ std::vector<Head> read_heads(const std::vector<std::string>& files) {
   return out;
 }
 
+/// "audit.jsonl.1": its end is told by the file that came after it.
+bool was_renamed(const std::string& file) {
+  const auto dot = file.rfind('.');
+  return dot != std::string::npos && dot + 1 < file.size() &&
+         file.find_first_not_of("0123456789", dot + 1) == std::string::npos;
+}
+
 }  // namespace
 
 rr::Result<std::vector<std::string>> sort_audit_files(std::vector<std::string> files) {
@@ -138,6 +145,11 @@ rr::Result<AuditTrail> verify_audit_files(const std::vector<std::string>& files)
         if (heads[i].chain.seq == trail.last.seq) hashes[i] = trail.last.hash;
     }
     if (in.bad()) return unreadable(file);
+  }
+  if (heads.empty() && trail.records > 0 && !was_renamed(sorted->back())) {
+    const auto head = sorted->back() + ".head";
+    trail.findings.push_back(
+        {sorted->back(), 0, "no " + head + ": the end may have been cut off", head + ", which names the last record"});
   }
   for (std::size_t i = 0; i < heads.size(); ++i)
     if (const auto& [seq, hash] = heads[i].chain; hashes[i] != hash)

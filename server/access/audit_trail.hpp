@@ -28,7 +28,8 @@ struct AuditTrail {
 /// In the order of their records, without those that only name the last one. Errors   io_error: which can't be read.
 rr::Result<std::vector<std::string>> sort_audit_files(std::vector<std::string> files);
 
-/// Checks the chain through all files, in any order, and where there is a FILE.head, that its record is there.
+/// Checks the chain through all files, in any order, and that the record which FILE.head names is there. Without one
+/// the end may have been cut off; files that were renamed to FILE.1, FILE.2, ... have none.
 /// Errors   io_error: which can't be read.
 rr::Result<AuditTrail> verify_audit_files(const std::vector<std::string>& files);
 

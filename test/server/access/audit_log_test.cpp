@@ -275,9 +275,33 @@ TEST_CASE("records that were edited, cut out, put elsewhere or cut off are found
     lines.resize(5);
     write_lines(folder.file(), lines);
     fs::remove(folder.file("audit.head"));
+    CHECK(check(0, "audit.head: the end may have been cut off", "which names the last record") == 1);
+    write_log({.file = folder.file()}, 1);
+    CHECK(read(folder.file()).find("audit.head is missing: the end of the file may have been cut off") !=
+          std::string::npos);
+  }
+  SECTION("cut off to where the gateway had stopped before, and what tells of it is gone") {
+    write_log({.file = folder.file()}, 2);
+    write_lines(folder.file(), lines);
+    fs::remove(folder.file("audit.head"));
+    CHECK(check(0, "audit.head: the end may have been cut off", "which names the last record") == 1);
+    write_log({.file = folder.file()}, 1);
+    CHECK(read(folder.file()).find("audit.head is missing: the end of the file may have been cut off") !=
+          std::string::npos);
+  }
+  SECTION("cut off at the end, and what tells of it was changed to match") {
+    write_lines(folder.file(), lines);
+    const auto last = parse_audit_line(lines[4]).value();
+    lines.resize(5);
+    std::ofstream(folder.file("audit.head")) << last.seq << ' ' << last.hash << '\n';
+    write_lines(folder.file(), lines);
     CHECK(findings_of({folder.file()}).empty());
     write_log({.file = folder.file()}, 1);
     CHECK(read(folder.file()).find("there is no \\\"stopped\\\"") != std::string::npos);
+  }
+  SECTION("a file that was renamed, checked alone") {
+    fs::rename(folder.file(), folder.file("audit.1"));
+    CHECK(findings_of({folder.file("audit.1")}).empty());
   }
 }
 
