@@ -70,8 +70,8 @@ void Logins::judge(rr::LoginAttempt attempt, ClientOrigin from, Of of, Done done
   if (const auto recordable = access_.audit().admit(); !recordable) return answer(recordable.error());
   auto& of_network = waiting_[from.network];
   if (of_network.empty()) turns_.push_back(from.network);
-  of_network.push_back({std::make_shared<const rr::LoginAttempt>(std::move(attempt)), std::move(from), std::move(done),
-                        key, users, std::move(*ticket)});
+  of_network.push_back({std::make_shared<const rr::LoginAttempt>(std::move(attempt)), std::move(from), of,
+                        std::move(done), key, users, std::move(*ticket)});
   judge_next();
 }
 
@@ -133,8 +133,10 @@ void Logins::finish(const Job& job, const Judged& result) {
     if (const auto found = waiting_.find(job.from.network); found != waiting_.end())
       std::erase_if(found->second, [&](const Job& other) {
         const bool is_same = other.key == job.key && other.users == job.users;
-        if (is_same) same.push_back(other.done);
-        return is_same;
+        if (!is_same) return false;
+        if (other.of == Of::session) record(*other.attempt, other.from, result);
+        same.push_back(other.done);
+        return true;
       });
     if (const auto found = waiting_.find(job.from.network); found != waiting_.end() && found->second.empty()) {
       waiting_.erase(found);

@@ -40,7 +40,7 @@ class Logins {
 
   enum class Of : std::uint8_t { session, request };
   /// Judges by the users file; `done` is called later. A password that was right is remembered for five minutes: with
-  /// each request comes one. Of those only the judged ones are recorded.
+  /// each request comes one. Of requests only those are recorded that were judged, of sessions all.
   /// Errors   authentication_error; out_of_system_resource: too many of this client are being judged.
   void judge(rr::LoginAttempt attempt, ClientOrigin from, Of of, Done done);
   rr::awaitable<Judged> judge(rr::LoginAttempt attempt, ClientOrigin from, Of of);
@@ -54,6 +54,7 @@ class Logins {
   struct Job {
     std::shared_ptr<const rr::LoginAttempt> attempt;
     ClientOrigin from;
+    Of of;
     Done done;
     std::string key;  ///< of known_
     Users users;

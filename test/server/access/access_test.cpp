@@ -3,6 +3,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +12,7 @@
 #include <sstream>
 
 #include "node/service/password_hash.hpp"
+#include "server/access/logins.hpp"
 #include "server/access/standing.hpp"
 #include "test/server/access/jwt_signer.hpp"
 #include "test/support/print.hpp"
@@ -368,6 +371,35 @@ TEST_CASE("users that come, go or change are recorded when their file is read an
   CHECK(lines[1]["detail"] == "alice: roles viewer, another password");
   CHECK(lines[2]["event"] == "user_added");
   CHECK(lines[2]["detail"] == "dave: roles viewer,operator");
+}
+
+TEST_CASE("sessions that log in at once with one password are each recorded") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  boost::asio::io_context io{1};
+  const auto work = boost::asio::make_work_guard(io);
+  Logins logins(io.get_executor(), access);
+  int answered = 0;
+  const auto judge = [&](const std::string& client, Logins::Of of) {
+    rr::LoginAttempt attempt;
+    attempt.username = "alice";
+    attempt.credentials.items.emplace_back("password", rr::Value(std::string_view("one")));
+    logins.judge(std::move(attempt), {.client = client, .network = "192.0.2.1", .face = Face::native}, of,
+                 [&](const Logins::Judged& user) {
+                   CHECK(user);
+                   ++answered;
+                 });
+  };
+  for (const auto* client : {"192.0.2.1:1", "192.0.2.1:2", "192.0.2.1:3"}) judge(client, Logins::Of::session);
+  judge("192.0.2.1:4", Logins::Of::request);  // one with each request: those are not recorded
+  while (answered < 4 && io.run_one_for(std::chrono::seconds(10)) > 0) continue;
+  CHECK(answered == 4);
+  std::vector<std::string> clients;
+  for (const auto& line : files.audit(access))
+    if (line["event"] == "login") clients.push_back(line["client"]);
+  CHECK(clients == std::vector<std::string>{"192.0.2.1:1", "192.0.2.1:2", "192.0.2.1:3"});
 }
 
 TEST_CASE("what is asked for too often is recorded once of a network and minute, and the sum of it") {
