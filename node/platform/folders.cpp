@@ -70,6 +70,10 @@ Result<fs::path> system_state_folder() {
   return system_folder("ROBOTRACONTEUR_SYSTEM_STATE_DIR", "/var/lib/robotraconteur");
 }
 
+Result<fs::path> user_state_folder() {
+  return is_root() ? system_state_folder() : user_config_folder();
+}
+
 Result<fs::path> user_run_folder() {
   if (is_root()) {
     const auto system = system_run_folder();

@@ -20,6 +20,8 @@ namespace rr {
 ///          belongs to another user.
 [[nodiscard]] Result<std::filesystem::path> make_user_run_folder();
 [[nodiscard]] Result<std::filesystem::path> system_run_folder();
+/// What nodes of this user keep: that of the configuration, or of the machine's own nodes for root. Errors   as above.
+[[nodiscard]] Result<std::filesystem::path> user_state_folder();
 /// What this machine's own nodes keep.
 [[nodiscard]] Result<std::filesystem::path> system_state_folder();
 

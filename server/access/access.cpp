@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "core/support/glob.hpp"
+#include "core/support/hex.hpp"
 #include "node/platform/file_look.hpp"
+#include "node/platform/folders.hpp"
 #include "node/platform/text_file.hpp"
 #include "node/tls/digest.hpp"
 #include "node/tls/tls_context.hpp"
@@ -69,6 +71,15 @@ std::string credential_of(const rr::PasswordFileAuthenticator& users, std::strin
 
 void add_role(std::vector<std::string>& roles, const std::string& role) {
   if (std::find(roles.begin(), roles.end(), role) == roles.end()) roles.push_back(role);
+}
+
+/// With the NodeIDs, where the gateway may write: beside its key a service may not. Gateways of one key and one user
+/// share it. Empty: there is no such folder.
+std::string file_of_ended_sign_ins(const rr::Bytes& key) {
+  const auto folder = rr::user_state_folder();
+  if (!folder) return {};
+  const auto name = rr::hex_text(rr::hmac_sha256(key, rr::as_bytes("signed out"))).substr(0, 16);
+  return (*folder / "rrgate" / ("signed-out." + name)).string();
 }
 
 /// What goes into the audit log though it was allowed.
@@ -242,7 +253,8 @@ void Access::take(AccessStatePtr next) {
   if (next->ticket_key != state_->ticket_key) {
     const auto key = next->ticket_key.empty() ? rr::random_bytes(min_ticket_key) : next->ticket_key;
     tickets_ = Tickets(key);
-    sign_ins_ = SignIns(key);
+    const auto file = next->ticket_key.empty() ? std::string() : file_of_ended_sign_ins(key);
+    sign_ins_ = SignIns(key, file, std::chrono::system_clock::now());
   }
   state_ = std::move(next);
   users_->set(state_->users);
@@ -284,7 +296,11 @@ void Access::reload(bool is_forced) {
 }
 
 bool Access::sign_out(const Identity& who) {
-  if (!sign_ins_.end(who, std::chrono::system_clock::now())) return false;
+  const auto now = std::chrono::system_clock::now();
+  if (!sign_ins_.end(who, now)) return false;
+  if (auto kept = sign_ins_.keep_ended(who, now); !kept)
+    log(LogLevel::warning, "signing out can't be kept: after a restart a copied cookie is good again",
+        {{"error", kept.error().message}});
   state_ = std::make_shared<const AccessState>(*state_);  // so that everybody is judged anew
   record({.event = "signed_out", .who = &who});
   return true;

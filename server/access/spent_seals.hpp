@@ -21,15 +21,14 @@ class SpentSeals {
 
   bool has(std::string_view id) const { return spent_.contains(id); }
 
-  /// False: it is here already, or there are too many.
-  bool add(std::string id, const Subject& subject, Time ends, Time now) {
-    const auto key = subject.key();
+  /// `subject`  what tells whose it is. False: it is here already, or there are too many.
+  bool add(std::string id, std::string subject, Time ends, Time now) {
     if (has(id)) return false;
-    if (is_full(key) && now >= earliest_) forget_late(now);
-    if (is_full(key)) return false;
+    if (is_full(subject) && now >= earliest_) forget_late(now);
+    if (is_full(subject)) return false;
     earliest_ = std::min(earliest_, ends);
-    ++counts_[key];
-    spent_.emplace(std::move(id), Spent{ends, key});
+    ++counts_[subject];
+    spent_.emplace(std::move(id), Spent{ends, std::move(subject)});
     return true;
   }
 

@@ -18,7 +18,7 @@ std::optional<std::string> Tickets::issue(const Identity& who, Time now) const {
 std::optional<Identity> Tickets::redeem(std::string_view ticket, Time now) {
   auto found = unseal(key_, ticket_purpose, ticket, now);
   if (!found) return std::nullopt;
-  if (!used_.add(std::move(found->id), found->who.subject(), found->ends, now)) return std::nullopt;
+  if (!used_.add(std::move(found->id), found->who.subject().key(), found->ends, now)) return std::nullopt;
   return std::move(found->who);
 }
 

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "test/node/transport/sandbox.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
 
@@ -14,16 +15,17 @@ const std::string own_page = "Origin: http://localhost:8080\r\n";
 
 /// A gateway with the tokens "ci" and "bob".
 struct Guarded {
+  rr::Sandbox folders;
   Folder files;
   std::string key = "a key of thirty-two bytes or more";
   std::string token = make_api_token();
   std::string token_of_bob = make_api_token();
   std::string line = "ci " + hash_api_token(token) + " admin _\n";
-  TestGateway gateway{1, [this](Config& config) {
-                        config.access.tokens_file =
-                            files.write("tokens", line + "bob " + hash_api_token(token_of_bob) + " viewer _\n");
-                        config.access.ticket_key_file = files.write("key", key);
-                      }};
+  std::function<void(Config&)> change = [this](Config& config) {
+    config.access.tokens_file = files.write("tokens", line + "bob " + hash_api_token(token_of_bob) + " viewer _\n");
+    config.access.ticket_key_file = files.write("key", key);
+  };
+  TestGateway gateway{1, change};
 
   TestClient::HttpResponse ask(const std::string& first, const std::string& lines = {}, const std::string& body = {}) {
     TestClient client(gateway.port());
@@ -131,6 +133,21 @@ TEST_CASE("signing out: no cookie of the sign-in is taken any more, and what wen
   CHECK(guarded.who(other) == "ci");
   CHECK_NOTHROW(socket.receive_all());
   CHECK(guarded.ask("DELETE /api/v1/session", cookie + own_page).status == 204);
+}
+
+TEST_CASE("signing out holds behind a restart, too") {
+  Guarded guarded;
+  const auto cookie = guarded.cookie();
+  const auto other = guarded.cookie();
+  CHECK(guarded.ask("DELETE /api/v1/session", cookie + own_page).status == 204);
+  const TestGateway next(0, guarded.change);
+  const auto who = [&](const std::string& lines) {
+    TestClient client(next.port());
+    client.send("GET /api/v1/access HTTP/1.1\r\nHost: localhost:8080\r\n" + lines + "\r\n");
+    return nlohmann::json::parse(client.receive_response().body)["user"];
+  };
+  CHECK(who(cookie).is_null());
+  CHECK(who(other) == "ci");
 }
 
 TEST_CASE("a response renews a cookie when half its time is over, unless it sets another one, or takes it away") {

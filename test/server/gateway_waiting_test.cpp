@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "test/node/node/node_fixture.hpp"
+#include "test/node/transport/sandbox.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
 
@@ -103,6 +104,7 @@ TEST_CASE("clients of a shared device that read a property at once are one read 
 }
 
 TEST_CASE("a request that was at work when its sign-in ended is answered, and gives no cookie back") {
+  const rr::Sandbox folders;
   SlowDevice device;
   const Folder files;
   const std::string key = "a key of thirty-two bytes or more";

@@ -1,13 +1,18 @@
 // What is bounded in number and time: tickets, requests of access.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 
 #include "server/access/access_requests.hpp"
+#include "server/access/ended_sign_ins.hpp"
 #include "server/access/login_limits.hpp"
 #include "server/access/refusal_digest.hpp"
 #include "server/access/sign_ins.hpp"
 #include "server/access/tickets.hpp"
 #include "server/limits/client_network.hpp"
+#include "test/support/folder.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
@@ -253,6 +258,48 @@ TEST_CASE("sign-ins: with use they go on for a week, and end with all their cook
   CHECK_FALSE(sign_ins.find(second, day));
   CHECK_FALSE(sign_ins.extend(first, day + hours(5)));
   CHECK(sign_ins.find(other, day));
+}
+
+TEST_CASE("sign-ins: a restart takes none up again that had ended") {
+  using std::chrono::hours;
+  const test::Folder folder;
+  const auto file = folder.path("state/signed-out");
+  const rr::Bytes key(32, 7);
+  Identity alice;
+  alice.name = "alice";
+  SignIns before(key, file, day);
+  const auto cookie = before.begin(alice, day).value();
+  const auto other = before.begin(alice, day).value();
+  const auto last = before.begin(alice, day).value();
+  const auto sign_out = [&](const std::string& of, SignIns::Time now) {
+    const auto who = before.find(of, now).value();
+    REQUIRE(before.end(who, now));
+    return before.keep_ended(who, now);
+  };
+  REQUIRE(sign_out(cookie, day));
+  CHECK((std::filesystem::status(file).permissions() & std::filesystem::perms(0777)) == std::filesystem::perms(0600));
+  const SignIns after(key, file, day + hours(1));
+  CHECK_FALSE(after.find(cookie, day + hours(1)));
+  CHECK(after.find(other, day + hours(1)));
+  CHECK(read_ended_sign_ins(file, day + hours(8)).empty());
+
+  // A piece of a line costs no other one.
+  std::ofstream(file, std::ios::app) << "\nabcdefgh 19";
+  REQUIRE(sign_out(other, day + hours(1)));
+  std::ofstream(file, std::ios::app) << "x 99999999999999999999 y\nx " << std::numeric_limits<std::int64_t>::max()
+                                     << " y";
+  CHECK(read_ended_sign_ins(file, day + hours(1)).size() == 3);
+  CHECK_FALSE(SignIns(key, file, day + hours(1)).find(other, day + hours(1)));
+
+  // What is too late goes when there is much of it.
+  std::ofstream(file, std::ios::app) << "\nlate 1 z " << std::string(9'000'000, '\n');
+  REQUIRE(sign_out(last, day + hours(1)));
+  CHECK(std::filesystem::file_size(file) < 1000);
+  const SignIns next(key, file, day + hours(1));
+  for (const auto& each : {cookie, other, last}) CHECK_FALSE(next.find(each, day + hours(1)));
+
+  SignIns nowhere(key, file + "/no/folder", day);
+  CHECK_THAT(nowhere.keep_ended(alice, day).error().message, Catch::Contains("Not a directory"));
 }
 
 TEST_CASE("requests of access: asked, decided, fetched once") {
