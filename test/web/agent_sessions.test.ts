@@ -1,6 +1,6 @@
 // What agents do: read from whatever the gateway answers, kept while it is away, asked for only while shown.
-import { AgentSessionList, awayAfter, readAgentSessions } from "../../web/src/gateway/agent_sessions";
-import type { AgentSession, AgentSessionsState } from "../../web/src/gateway/agent_sessions";
+import { agentSessions, readAgentSessions } from "../../web/src/gateway/agent_sessions";
+import type { AgentSession } from "../../web/src/gateway/agent_sessions";
 
 /** As the gateway writes it. */
 const written = {
@@ -74,15 +74,6 @@ describe("sessions of agents", () => {
     for (const none of [null, undefined, 1, "sessions", [], {}, { sessions: null }, { sessions: { length: 1 } }])
       expect(() => readAgentSessions(none)).toThrow('no list "sessions"');
   });
-
-  it("stay as they were while the gateway is away, since when it went", () => {
-    const known: AgentSessionsState = { kind: "known", sessions: [read] };
-    const away = awayAfter(known, new TypeError("fetch failed"), 1000);
-    expect(away).toEqual({ kind: "away", since: 1000, reason: "the gateway cannot be reached", sessions: [read] });
-    expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", sessions: [read] });
-    expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, sessions: null });
-    expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ sessions: null });
-  });
 });
 
 describe("a list of sessions of agents", () => {
@@ -118,13 +109,13 @@ describe("a list of sessions of agents", () => {
   it("is asked again every 2 s, and no more once it is closed", async () => {
     vi.setSystemTime(100_000);
     answers.push(Response.json({ sessions: [written] }), Response.json({ sessions: [] }));
-    const list = new AgentSessionList();
+    const list = agentSessions();
     expect(list.state.value).toEqual({ kind: "loading" });
     list.start();
     await vi.advanceTimersByTimeAsync(0);
-    expect(list.state.value).toEqual({ kind: "known", sessions: [read] });
+    expect(list.state.value).toEqual({ kind: "known", items: [read] });
     await vi.advanceTimersByTimeAsync(2000);
-    expect(list.state.value).toEqual({ kind: "known", sessions: [] });
+    expect(list.state.value).toEqual({ kind: "known", items: [] });
     expect(asked).toEqual(Array(2).fill("https://host/robots/api/v1/agents/sessions"));
     list.stop();
     await vi.advanceTimersByTimeAsync(60_000);
@@ -140,25 +131,25 @@ describe("a list of sessions of agents", () => {
       Response.json({ sessions: [written] }),
       Response.json([]),
     );
-    const list = new AgentSessionList();
+    const list = agentSessions();
     list.start();
     await vi.advanceTimersByTimeAsync(0);
     expect(list.state.value).toEqual({ kind: "denied", reason: "vera may not" });
     await vi.advanceTimersByTimeAsync(2000);
     expect(list.state.value).toEqual({ kind: "denied", reason: "the gateway answered 401" });
     await vi.advanceTimersByTimeAsync(2000);
-    expect(list.state.value).toMatchObject({ kind: "away", reason: "no agents", sessions: null });
+    expect(list.state.value).toMatchObject({ kind: "away", reason: "no agents", items: null });
     await vi.advanceTimersByTimeAsync(2000);
-    expect(list.state.value).toMatchObject({ kind: "known", sessions: [{ user: "vera" }] });
+    expect(list.state.value).toMatchObject({ kind: "known", items: [{ user: "vera" }] });
     await vi.advanceTimersByTimeAsync(2000);
-    expect(list.state.value).toMatchObject({ kind: "away", sessions: [{ user: "vera" }] });
+    expect(list.state.value).toMatchObject({ kind: "away", items: [{ user: "vera" }] });
     await vi.advanceTimersByTimeAsync(2000);
-    expect(list.state.value).toMatchObject({ reason: "the gateway cannot be reached", sessions: [{ user: "vera" }] });
+    expect(list.state.value).toMatchObject({ reason: "the gateway cannot be reached", items: [{ user: "vera" }] });
     list.stop();
   });
 
   it("is not asked for while the page is hidden, and at once when it is shown", async () => {
-    const list = new AgentSessionList();
+    const list = agentSessions();
     page.hidden = true;
     list.start();
     await vi.advanceTimersByTimeAsync(60_000);

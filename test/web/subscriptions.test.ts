@@ -1,6 +1,8 @@
 // What the clients of a shared device listen to: read, kept while the gateway is away, asked for only while shown.
-import { awayAfter, readSubscriptions, SubscriptionList } from "../../web/src/gateway/subscriptions";
-import type { Subscription, SubscriptionsState } from "../../web/src/gateway/subscriptions";
+import { awayAfter } from "../../web/src/gateway/polled_list";
+import type { Polled } from "../../web/src/gateway/polled_list";
+import { readSubscriptions, subscriptionsAt } from "../../web/src/gateway/subscriptions";
+import type { Subscription } from "../../web/src/gateway/subscriptions";
 import { ageText } from "../../web/src/ui/words";
 
 const frames: Subscription = {
@@ -35,21 +37,21 @@ describe("subscriptions", () => {
   });
 
   it("stay as they were while the gateway is away, since when it went", () => {
-    const known: SubscriptionsState = { kind: "known", subscriptions: [frames] };
+    const known: Polled<Subscription> = { kind: "known", items: [frames] };
     const away = awayAfter(known, new TypeError("fetch failed"), 1000);
     expect(away).toEqual({
       kind: "away",
       since: 1000,
       reason: "the gateway cannot be reached",
-      subscriptions: [frames],
+      items: [frames],
     });
     expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({
       since: 1000,
       reason: "late",
-      subscriptions: [frames],
+      items: [frames],
     });
-    expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, subscriptions: null });
-    expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ subscriptions: null });
+    expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, items: null });
+    expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ items: null });
   });
 });
 
@@ -84,12 +86,12 @@ describe("a list of subscriptions", () => {
 
   it("is asked again every 3 s, and no more once it is closed", async () => {
     answers.push(Response.json({ subscriptions: [written(frames)] }), Response.json({ subscriptions: [] }));
-    const list = new SubscriptionList("a b");
+    const list = subscriptionsAt("a b");
     list.start();
     await vi.advanceTimersByTimeAsync(0);
-    expect(list.state.value).toEqual({ kind: "known", subscriptions: [frames] });
+    expect(list.state.value).toEqual({ kind: "known", items: [frames] });
     await vi.advanceTimersByTimeAsync(3000);
-    expect(list.state.value).toEqual({ kind: "known", subscriptions: [] });
+    expect(list.state.value).toEqual({ kind: "known", items: [] });
     expect(asked).toEqual(Array(2).fill("https://host/robots/api/v1/devices/a%20b/subscriptions"));
     list.stop();
     await vi.advanceTimersByTimeAsync(60_000);
@@ -98,7 +100,7 @@ describe("a list of subscriptions", () => {
 
   it("says who may not see it, and why", async () => {
     answers.push(Response.json({ detail: "vera may not" }, { status: 403 }), new Response("", { status: 401 }));
-    const list = new SubscriptionList("robot");
+    const list = subscriptionsAt("robot");
     list.start();
     await vi.advanceTimersByTimeAsync(0);
     expect(list.state.value).toEqual({ kind: "denied", reason: "vera may not" });
@@ -108,13 +110,13 @@ describe("a list of subscriptions", () => {
     expect(list.state.value).toMatchObject({
       kind: "away",
       reason: "the gateway cannot be reached",
-      subscriptions: null,
+      items: null,
     });
     list.stop();
   });
 
   it("is not asked for while the page is hidden, and at once when it is shown", async () => {
-    const list = new SubscriptionList("robot");
+    const list = subscriptionsAt("robot");
     page.hidden = true;
     list.start();
     await vi.advanceTimersByTimeAsync(60_000);

@@ -1,11 +1,8 @@
 // The sessions of agents and what each has done, asked again every few seconds while shown.
 // Layer: web/gateway. Source: GET /api/v1/agents/sessions. What an agent calls itself is its own word: text, and no more.
 
-import { Store } from "../app/store";
 import { count, isRecord, text } from "./fields";
-import { Poller, reasonOf } from "./poller";
-import { problemOf } from "./answer";
-import { session } from "./session";
+import { PolledList } from "./polled_list";
 
 export interface AgentCommand {
   /** Milliseconds, as Date.now() counts them. */
@@ -37,55 +34,10 @@ export interface AgentSession {
   lastCommands: AgentCommand[];
 }
 
-export type AgentSessionsState =
-  | { kind: "loading" }
-  | { kind: "known"; sessions: AgentSession[] }
-  /** The gateway refuses to tell. */
-  | { kind: "denied"; reason: string }
-  /** It does not answer; `sessions` are what it said last, null if it never did. */
-  | { kind: "away"; since: number; reason: string; sessions: AgentSession[] | null };
-
 const POLL_MS = 2_000;
 
-export class AgentSessionList {
-  readonly state = new Store<AgentSessionsState>({ kind: "loading" });
-  readonly #poller = new Poller<AgentSessionsState>({
-    ask: (signal) => this.#fetch(signal),
-    answered: (next) => (this.state.value = next),
-    failed: (error) => (this.state.value = awayAfter(this.state.value, error, Date.now())),
-    period: POLL_MS,
-    hiddenPeriod: null, // nobody looks at a hidden tab
-  });
-
-  start(): void {
-    this.#poller.start();
-  }
-
-  stop(): void {
-    this.#poller.stop();
-  }
-
-  async #fetch(signal: AbortSignal): Promise<AgentSessionsState> {
-    const response = await session.fetch("api/v1/agents/sessions", { signal });
-    if (response.ok) return { kind: "known", sessions: readAgentSessions(await response.json()) };
-    const reason = await problemOf(response);
-    if (response.status === 401 || response.status === 403) return { kind: "denied", reason };
-    throw new Error(reason);
-  }
-}
-
-/** The state when asking has failed: it keeps what was known. */
-export function awayAfter(before: AgentSessionsState, error: unknown, now: number): AgentSessionsState {
-  return {
-    kind: "away",
-    since: before.kind === "away" ? before.since : now,
-    reason: reasonOf(error),
-    sessions: sessionsOf(before),
-  };
-}
-
-export function sessionsOf(state: AgentSessionsState): AgentSession[] | null {
-  return state.kind === "known" || state.kind === "away" ? state.sessions : null;
+export function agentSessions(): PolledList<AgentSession> {
+  return new PolledList("api/v1/agents/sessions", readAgentSessions, POLL_MS);
 }
 
 /** In the order of the gateway: the latest used first. @throws Error when it is no list: that is not "no agents". */

@@ -1,14 +1,15 @@
 // What agents do, for those who decide on them: sessions and last commands. Closed at first; asks only while it is open.
 // Layer: web/pages.
 
-import { useEffect, useState } from "preact/hooks";
 import { language, t } from "../app/language";
 import { useNow, useStore } from "../app/store";
-import { AgentSessionList, sessionsOf } from "../gateway/agent_sessions";
-import type { AgentCommand, AgentSession, AgentSessionsState } from "../gateway/agent_sessions";
+import { agentSessions } from "../gateway/agent_sessions";
+import type { AgentCommand, AgentSession } from "../gateway/agent_sessions";
 import type { AgentsDesk } from "../gateway/agents";
+import { itemsOf } from "../gateway/polled_list";
 import { Folded } from "../ui/folded";
-import { clockTime, ended, span } from "../ui/words";
+import { clockTime, span } from "../ui/words";
+import { headline, usePolled } from "./polled";
 
 export function AgentSessionsPart({ agents }: { agents: AgentsDesk }) {
   if (!useStore(agents.state)) return null;
@@ -20,21 +21,16 @@ export function AgentSessionsPart({ agents }: { agents: AgentsDesk }) {
 }
 
 function Sessions() {
-  const [list] = useState(() => new AgentSessionList());
-  useEffect(() => {
-    list.start();
-    return () => list.stop();
-  }, [list]);
-  const state = useStore(list.state);
+  const state = usePolled(agentSessions);
   const now = useNow(1_000);
   return (
     <div data-agent-sessions={state.kind}>
       <p class="note" role="status">
-        {headline(state)}
+        {headline(state, known)}
       </p>
       {state.kind === "loading" && <span class="bone" aria-hidden="true" />}
       <ul>
-        {sessionsOf(state)?.map((each, row) => (
+        {itemsOf(state)?.map((each, row) => (
           <SessionRow key={row} session={each} now={now} />
         ))}
       </ul>
@@ -42,16 +38,8 @@ function Sessions() {
   );
 }
 
-/** Changes rarely, so that it can be announced: the numbers are below. */
-function headline(state: AgentSessionsState): string {
-  if (state.kind === "loading") return t("Asking the gateway for them.");
-  if (state.kind === "denied") return t("You may not see them: {0}", ended(state.reason));
-  if (state.kind === "away") {
-    const below = state.sessions && state.sessions.length > 0 ? ` ${t("Below is what it said last.")}` : "";
-    const since = clockTime(state.since);
-    return `${t("The gateway has not told them since {0}: {1}", since, ended(state.reason))}${below}`;
-  }
-  if (state.sessions.length === 0) return t("The gateway knows of no agent now.");
+function known(sessions: AgentSession[]): string {
+  if (sessions.length === 0) return t("The gateway knows of no agent now.");
   return t("The agents that were here last, and the last commands of each.");
 }
 

@@ -1,13 +1,13 @@
 // What the clients of a shared device listen to, and what each has lost. Closed at first; asks only while it is open.
 // Layer: web/pages.
 
-import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { useStore } from "../app/store";
-import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
-import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
+import { itemsOf } from "../gateway/polled_list";
+import { subscriptionsAt } from "../gateway/subscriptions";
+import type { Subscription } from "../gateway/subscriptions";
 import { Folded } from "../ui/folded";
-import { ageText, clockTime, ended } from "../ui/words";
+import { ageText } from "../ui/words";
+import { headline, usePolled } from "./polled";
 
 interface Props {
   device: string;
@@ -30,36 +30,22 @@ export function SubscriptionsPart({ device, online, stale }: Props) {
 }
 
 function Subscriptions({ device, online, stale }: Props) {
-  const [list] = useState(() => new SubscriptionList(device));
-  useEffect(() => {
-    list.start();
-    return () => list.stop();
-  }, [list]);
-  const state = useStore(list.state);
-  const subscriptions = subscriptionsOf(state);
+  const state = usePolled(() => subscriptionsAt(device));
+  const subscriptions = itemsOf(state);
+  const known = ({ length }: Subscription[]): string => {
+    if (!online && !stale) return t("The device is away: nothing comes until it is back, and then they go on.");
+    if (length === 0) return t("No client listens to a wire or a pipe of it now.");
+    return t("Wires and pipes of each client, since it connected them.");
+  };
   return (
     <div data-subscriptions={state.kind}>
       <p class="note" role="status">
-        {headline(state, online, stale)}
+        {headline(state, known)}
       </p>
       {state.kind === "loading" && <span class="bone" aria-hidden="true" />}
       {subscriptions && subscriptions.length > 0 && <Table device={device} subscriptions={subscriptions} />}
     </div>
   );
-}
-
-/** Changes rarely, so that it can be announced: the numbers are in the table. */
-function headline(state: SubscriptionsState, online: boolean, stale: boolean): string {
-  if (state.kind === "loading") return t("Asking the gateway for them.");
-  if (state.kind === "denied") return t("You may not see them: {0}", ended(state.reason));
-  if (state.kind === "away") {
-    const below = state.subscriptions && state.subscriptions.length > 0 ? ` ${t("Below is what it said last.")}` : "";
-    const since = clockTime(state.since);
-    return `${t("The gateway has not told them since {0}: {1}", since, ended(state.reason))}${below}`;
-  }
-  if (!online && !stale) return t("The device is away: nothing comes until it is back, and then they go on.");
-  if (state.subscriptions.length === 0) return t("No client listens to a wire or a pipe of it now.");
-  return t("Wires and pipes of each client, since it connected them.");
 }
 
 /** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */

@@ -4,7 +4,8 @@
 import { useEffect, useMemo } from "preact/hooks";
 import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
-import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
+import { itemsOf } from "../gateway/polled_list";
+import { subscriptionsAt } from "../gateway/subscriptions";
 import { isUsb } from "../gateway/usb_devices";
 import { openFeeds } from "../live/feed";
 import { formatRate } from "../live/rate";
@@ -13,13 +14,13 @@ import type { PanelProps } from "./panel";
 
 export default function StreamsPanel({ place }: PanelProps) {
   useNow(250);
-  const list = useMemo(() => new SubscriptionList(place.device), [place.device]);
+  const list = useMemo(() => subscriptionsAt(place.device), [place.device]);
   useEffect(() => {
     if (isUsb(place.device)) return;
     list.start();
     return () => list.stop();
   }, [list]);
-  const lost = subscriptionsOf(useStore(list.state)) ?? [];
+  const lost = itemsOf(useStore(list.state)) ?? [];
   const now = performance.now();
   return (
     <div class="panel-scroll" tabIndex={0} role="group" aria-label={t("Streams")}>
