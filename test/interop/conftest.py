@@ -21,13 +21,25 @@ matrix = Matrix()
 def pytest_configure(config):
     """Local nodes keep their files in a folder of this run: no other node of the machine is met, none is disturbed."""
     config.local_folder = tempfile.mkdtemp(prefix="rr-interop-")  # short: it is part of a socket's path
-    os.environ["ROBOTRACONTEUR_SYSTEM_PREFIX"] = config.local_folder
-    os.environ["ROBOTRACONTEUR_USER_RUN_DIR"] = config.local_folder + "/run"
-    os.environ["ROBOTRACONTEUR_USER_HOME"] = config.local_folder + "/home"
+    os.environ.update(local_variables(config.local_folder))
+
+
+def local_variables(folder):
+    return {"ROBOTRACONTEUR_SYSTEM_PREFIX": folder, "ROBOTRACONTEUR_USER_RUN_DIR": folder + "/run",
+            "ROBOTRACONTEUR_USER_HOME": folder + "/home"}
 
 
 def pytest_unconfigure(config):
     shutil.rmtree(config.local_folder, ignore_errors=True)
+
+
+@pytest.fixture
+def own_local_folder(monkeypatch):
+    """Local nodes of the test do not meet those of a link, which last until the next one."""
+    with tempfile.TemporaryDirectory(prefix="rr-interop-") as folder:
+        for name, value in local_variables(folder).items():
+            monkeypatch.setenv(name, value)
+        yield
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -88,15 +100,12 @@ def pytest_collection_modifyitems(config, items):
 
 
 def group_of(item):
-    """Tests of a group run one after the other: those with the network's namespaces, those of the one name that their
-    services have on this machine, those of a link, else a file's."""
+    """Tests of a group run one after the other: those of a link, those with the network's namespaces, else a file's."""
     if "network" in item.fixturenames:
         return "network"
-    if item.get_closest_marker("local_name"):
-        return "local"
     if hasattr(item, "callspec") and "link" in item.callspec.params:
         direction, level = item.callspec.params["link"]
-        return "local" if direction.route.endswith("local") else f"{direction.name}-{level}"
+        return f"{direction.name}-{level}"
     return item.path.stem
 
 

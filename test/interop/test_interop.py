@@ -15,8 +15,7 @@ def test_scenario(link, chromium, scenario, carries):
     check_all(scenario.steps, run_client(direction, port, scenario, chromium))
 
 
-@pytest.mark.local_name
-def test_our_local_service_through_the_gateway(tmp_path, carries):
+def test_our_local_service_through_the_gateway(tmp_path, own_local_folder, carries):
     """As direction ours-gateway-local-reference, which has all scenarios; the gateway's part does not depend on the service."""
     carries("ours", "ours", "rr+ws", "rr+local")
     direction = Direction("ours-gateway-local-ours", "ours", "gateway-ws-local", "ours", "v4")

@@ -359,7 +359,9 @@ class ServiceSession {
                  const AuthenticatedUser* user) const;
   Result<> admit_special(const Message& message, const MessageEntry& entry) const;
   Error missing_service(std::string_view name) const;
-  std::shared_ptr<const ServiceDefinition> find_definition(std::string_view service, std::string_view name) const;
+  /// Until `outgoing_` is sent, texts of the service's definitions stay what they are.
+  const TypeRegistry& keep_types(const HostedService& service);
+  const ServiceDefinition* find_definition(std::string_view service, std::string_view name);
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
   bool refuse_reused_id(const MessageEntry& entry, Now now);
   void answer_pass(const MessageEntry& answer);

@@ -207,9 +207,8 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   if (!type) type = find_text(message, entry, "servicetype");
   if (type) {
     // Services of a node may have definitions of one name and two texts: the one that the client asks counts.
-    const auto definition = find_definition(entry.service_path, type->text());
+    const auto* definition = find_definition(entry.service_path, type->text());
     if (!definition) return service_not_found();
-    outgoing_.keep_alive(definition);
     if (!write_tag(outgoing_, read_known_tag(message, entry), {definition->text}))
       outgoing_.add_text("servicedef", definition->text);
     return {};
@@ -219,7 +218,7 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   if (auto packed = write_attributes("attributes", *service); !packed) return packed;
   if (!service->extra_imports().empty())
     add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
-  outgoing_.keep_alive(service->shared_types());
+  keep_types(*service);
   outgoing_.add_text("servicedef", service->root_definition().text);
   return {};
 }
@@ -229,14 +228,18 @@ Error ServiceSession::missing_service(std::string_view name) const {
   return (is_told ? options_.why_missing(name) : std::nullopt).value_or(service_not_found());
 }
 
+const TypeRegistry& ServiceSession::keep_types(const HostedService& service) {
+  outgoing_.keep_alive(service.shared_types());
+  return service.types();
+}
+
 /// Of one service, else of any other that the client may know of.
-std::shared_ptr<const ServiceDefinition> ServiceSession::find_definition(std::string_view service,
-                                                                         std::string_view name) const {
+const ServiceDefinition* ServiceSession::find_definition(std::string_view service, std::string_view name) {
   if (const auto asked = directory_.find(service))
-    if (const auto* definition = asked->types().find_service(name)) return {asked->shared_types(), definition};
+    if (const auto* definition = keep_types(*asked).find_service(name)) return definition;
   for (const auto& [service_name, other] : directory_.services())
-    if (const auto* definition = other->types().find_service(name))
-      if (admits(EntryType::null, service_name, nullptr)) return {other->shared_types(), definition};
+    if (other->types().find_service(name) && admits(EntryType::null, service_name, nullptr))
+      return keep_types(*other).find_service(name);
   return nullptr;
 }
 
@@ -309,7 +312,7 @@ Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional
   if (request.wants_definitions) {
     std::vector<std::string_view> texts;
     for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
-    outgoing_.keep_alive(service->shared_types());
+    keep_types(*service);
     if (!write_tag(outgoing_, request.known_tag, texts)) add_text_list(outgoing_, "servicedefs", texts);
   }
   return write_attributes("attributes", *service);
