@@ -168,6 +168,9 @@ class FormerFile {
   explicit FormerFile(const std::string& path) : path_(path), aside_(path + ".before") {
     std::error_code error;
     if (!fs::is_regular_file(path, error)) return;
+    if (fs::exists(fs::symlink_status(aside_, error)))
+      throw NotUnderstood(aside_ +
+                          " is there: what an interrupted recording was to replace, or another file; move it away");
     fs::rename(path, aside_, error);
     if (error) throw std::runtime_error(path + ": can't be kept as " + aside_ + ": " + error.message());
     is_aside_ = true;

@@ -322,6 +322,18 @@ def test_mistakes_are_told(create, of_create, tmp_path):
     assert "is there already; --force replaces it" in rrgate("record", create, "-o", of_create, "--duration", "1", code=2)
     assert "Connection refused" in rrgate("record", f"rr+tcp://127.0.0.1:{free_port()}/?service=a", "-o", path, code=3)
     assert "/no/such/a.mcap: can't be written: No such file" in rrgate("record", create, "-o", "/no/such/a.mcap", code=1)
+def test_what_an_interrupted_recording_was_to_replace_is_kept(create, tmp_path):
+    path, before = tmp_path / "a.mcap", tmp_path / "a.mcap.before"
+    path.write_text("the interrupted one")
+    before.write_text("the former one")
+    said = rrgate("record", create, "-o", path, "--force", "--duration", "0.2", code=2)
+    assert f"{before} is there" in said and "move it away" in said
+    assert (path.read_text(), before.read_text()) == ("the interrupted one", "the former one")
+    before.unlink()
+    rrgate("record", create, "-o", path, "--force", "--duration", "0.2")
+    assert messages(path) and list(tmp_path.iterdir()) == [path]
+
+
     told = rrgate("record", create, "-o", path, "--members", "nonesuch", code=2)
     assert "'nonesuch': no member to record; " in told and "DistanceTraveled" in told
     assert not path.exists()
