@@ -234,11 +234,11 @@ std::vector<std::string> list_service_urls(const RemoteOptions& where, const std
   options.url = address_of_page(where.url);
   options.type = type;
   const auto place = options.url.substr(0, options.url.find_first_of("?#"));
-  const bool is_device = place.find("/devices/") != std::string::npos;
+  const bool is_device = place.starts_with("http") && place.find("/devices/") != std::string::npos;
   const auto service =
       rr::query_value(std::string_view(options.url).substr(std::min(place.size() + 1, options.url.size())), "service");
   const auto is_wanted = [&](const FoundService& each) {
-    return !is_device || (each.url.starts_with(place + "?") && each.name == service.value_or(each.name));
+    return (!is_device || each.url.starts_with(place + "?")) && each.name == service.value_or(each.name);
   };
   std::vector<std::string> out;
   for (const auto& each : list_services(options))

@@ -108,11 +108,15 @@ def test_services_are_recorded_by_their_type_and_by_the_name_of_a_gateways_devic
         base = f"http://127.0.0.1:{gateway.port}"
         node = create.split("?")[0]
         for number, words in enumerate(([f"{base}/devices/robot"], [base, "--type", "experimental.create2.Create"],
-                                        [node, "--type", "experimental.create2.Create"])):
+                                        [node, "--type", "experimental.create2.Create"],
+                                        [create, "--type", "experimental.create2.Create"])):
             file = tmp_path / f"{number}.mcap"
             rrgate("record", *words, "-o", file, "--duration", 1)
             assert "/Create/state" in {topic for topic, _, _ in messages(file)}
         said = rrgate("record", base, "--type", "com.example.Arm", "-o", tmp_path / "none.mcap", code=3)
+        other = create.replace("service=Create", "service=Other")  # the URL says which of the node's services
+        said = rrgate("record", other, "--type", "experimental.create2.Create", "-o", tmp_path / "none.mcap", code=3)
+        assert "no service of type experimental.create2.Create" in said and not (tmp_path / "none.mcap").exists()
         assert "no service of type com.example.Arm" in said and not (tmp_path / "none.mcap").exists()
         assert "--type" in rrgate("record", "-o", tmp_path / "none.mcap", code=2)
     finally:
