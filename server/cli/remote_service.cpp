@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 
+#include "core/support/utf8.hpp"
 #include "node/tls/base64.hpp"
 #include "server/cli/printable.hpp"
 #include "server/cli/stored_logins.hpp"
@@ -64,8 +65,27 @@ std::string member_names(const rr::EntityDefinition& type) {
   return out.empty() ? "none" : out;
 }
 
-std::string read_all(std::istream& in) {
-  return {std::istreambuf_iterator<char>(in), {}};
+struct ReadArgument {
+  std::string source;  ///< for errors
+  std::string content;
+};
+
+/// The line end with which editors and `echo` end text is no part of it.
+std::string read_text(std::istream& in) {
+  std::string out(std::istreambuf_iterator<char>(in), {});
+  for (const std::string_view line_end : {"\r\n", "\n"})
+    if (out.ends_with(line_end)) return out.substr(0, out.size() - line_end.size());
+  return out;
+}
+
+/// Throws   NotUnderstood: the file can't be read.
+ReadArgument read_argument(std::string_view text) {
+  if (text == "-") return {"standard input", read_text(std::cin)};
+  if (!text.starts_with("@")) return {rr::quote(text), std::string(text)};
+  const auto source = "file " + rr::quote(text.substr(1));
+  std::ifstream file{std::string(text.substr(1)), std::ios::binary};
+  if (!file) throw NotUnderstood(source + " can't be read");
+  return {source, read_text(file)};
 }
 
 }  // namespace
@@ -212,14 +232,8 @@ void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& k
 }
 
 rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& type) {
-  std::string content(text);
-  if (text == "-") {
-    content = read_all(std::cin);
-  } else if (text.starts_with("@")) {
-    std::ifstream file{std::string(text.substr(1)), std::ios::binary};
-    if (!file) throw NotUnderstood("file " + rr::quote(text.substr(1)) + " can't be read");
-    content = read_all(file);
-  }
+  const auto [source, content] = read_argument(text);
+  if (!rr::is_utf8(content)) throw NotUnderstood(source + " is not UTF-8");
   const bool is_one = type.container == rr::ContainerKind::none && type.array == rr::ArrayKind::none;
   const bool takes_text = is_one && type.type == rr::DataType::string_t;
   const bool takes_word = takes_text || (is_one && type.type == rr::DataType::enum_t);
@@ -228,7 +242,7 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
   // What a shell makes of "red" is red, and 5 is text where text is wanted.
   const bool is_word = !content.starts_with('{') && !content.starts_with('[');
   if (takes_text || (takes_word && is_word)) return rr::Json(content);
-  throw NotUnderstood(rr::quote(text) + " is not JSON: " + json.error().message);
+  throw NotUnderstood(source + " is not JSON: " + json.error().message);
 }
 
 rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {

@@ -129,6 +129,32 @@ def test_an_argument_may_be_a_file(reynard, tmp_path):
     assert Ran(["set", reynard, "color", "@nowhere"]).refused(NOT_UNDERSTOOD, "'nowhere'")
 
 
+def test_a_line_end_is_no_part_of_what_is_read(interop, tmp_path):
+    def is_refused(member, file, *words):
+        return Ran(["set", interop, member, f"@{file}"]).refused(NOT_UNDERSTOOD, "file '/", *words)
+
+    run("set", interop, "p_color", "-", given="blue\n")
+    assert run("get", interop, "p_color") == "blue"
+    file = tmp_path / "text"
+    for written, read in (b"red", "red"), (b"red\r\n", "red"), (b"two\n\n", "two\n"), (b'"quoted\\n"\n', "quoted\n"), (b"\n", ""):
+        file.write_bytes(written)
+        run("set", interop, "p_string", f"@{file}")
+        assert json.loads(run("get", interop, "p_string", "--json")) == read
+    file.write_bytes(b"M\xfcller\n")
+    assert is_refused("p_string", file, "is not UTF-8")
+    file.write_bytes(b"many\n")
+    assert is_refused("p_double", file, "is not JSON")
+    assert Ran(["set", interop, "p_double", "-"], given="many").refused(NOT_UNDERSTOOD, "standard input is not JSON")
+
+
+@pytest.fixture
+def interop(tmp_path):
+    """The test service, directly."""
+    service, url = start_service(tmp_path)
+    yield url
+    service.stop()
+
+
 def test_what_a_service_has_is_told(url):
     text = run("info", url)
     assert "reynard: experimental.reynard_the_robot.Reynard" in text
