@@ -78,6 +78,7 @@ std::vector<std::string> members_of(const std::string& url, std::string_view typ
   const auto found = find_member(open_service(remote_address(options)),
                                  prefix.empty() ? "" : std::string_view(prefix).substr(0, prefix.size() - 1));
   for (const auto& member : found.type->members) {
+    if (command == "watch" && member.direction() == rr::MemberDirection::writeonly) continue;
     const bool is_objref = member.kind == rr::MemberKind::objref;
     if (is_objref || kinds.empty() || std::find(kinds.begin(), kinds.end(), member.kind) != kinds.end())
       out.push_back(prefix + member.name + (is_objref ? "/" : ""));

@@ -160,6 +160,9 @@ void watch(const RemoteMember& found, ValuePrinter& printer, std::optional<stead
     connection.run_until([] { return true; }, print_limit);  // what came before the end
   const std::chrono::duration<double> seconds = steady_clock::now() - begin;
   std::cerr << printer.count() << " values in " << std::fixed << std::setprecision(1) << seconds.count() << " s, "
+  if (member.direction() == rr::MemberDirection::writeonly)
+    throw NotUnderstood(std::string(rr::member_kind_name(member.kind)) + " " + rr::quote(member.name) +
+                        " is writeonly: the device sends nothing");
             << static_cast<double>(printer.count()) / seconds.count() << " /s\n";
   if (is_open() && !connection.is_closed()) return;
   if (!connection.is_closed()) *end = "the service has closed it";

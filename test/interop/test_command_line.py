@@ -204,6 +204,13 @@ def test_values_are_watched(url):
     assert {row.count(",") for row in rows} == {header.count(",")}
 
 
+def test_what_a_device_only_takes_is_not_watched(interop):
+    assert Ran(["watch", interop, "target"]).refused(NOT_UNDERSTOOD, "wire 'target' is writeonly")
+    assert Ran(["watch", interop, "taken"]).refused(NOT_UNDERSTOOD, "pipe 'taken' is writeonly")
+    offered = complete("watch", interop, "")
+    assert {"state", "both", "poses", "changed"} <= set(offered) and not {"target", "taken"} & set(offered)
+
+
 def test_values_of_wires_have_the_devices_time_and_their_age(url):
     def parse(text):
         return datetime.datetime.fromisoformat(text.replace("Z", "+00:00"))
