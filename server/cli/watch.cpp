@@ -1,4 +1,5 @@
 // rrgate watch: values of a wire, packets of a pipe, events, one line each. Layer: server/cli.
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <ctime>
@@ -7,6 +8,8 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/session/service_path.hpp"
 #include "node/driver/clocks.hpp"
@@ -54,6 +57,60 @@ std::string age_text(double age) {
   return text;
 }
 
+/// How many rows wait for a value that tells which columns the table has.
+constexpr std::size_t max_waiting_rows = 1000;
+
+/// A table with a column for each number of the first value that has any, named by its place: "/position/0".
+class CsvTable {
+ public:
+  /// `times`  first cells of the row, whose columns are called `time_names`.
+  void print(const rr::Json& value, const std::string& time_names, const std::string& times) {
+    const auto cells = value.flatten();
+    std::ptrdiff_t left = std::count_if(cells.begin(), cells.end(), [](const auto& cell) { return !cell.is_null(); });
+    if (columns_.empty()) {
+      time_names_ = time_names;
+      // Of an empty list, or null: the next one may have numbers.
+      if (left == 0 && may_have_numbers_ && waiting_.size() < max_waiting_rows) return waiting_.push_back(times);
+      begin(cells);
+    }
+    std::cout << times;
+    for (const auto& column : columns_) {
+      const auto cell = cells.find(column);
+      std::cout << ",";
+      if (cell == cells.end() || cell->is_null()) continue;
+      std::cout << csv_cell(*cell);
+      --left;
+    }
+    std::cout << std::endl;
+    without_column_ += static_cast<std::uint64_t>(left);
+  }
+  /// Each row is shown as it comes.
+  void expect_no_numbers() { may_have_numbers_ = false; }
+  void end() {
+    if (columns_.empty() && !waiting_.empty()) begin(rr::Json(nullptr).flatten());
+    if (without_column_ > 0) std::cerr << "numbers without a column: " << without_column_ << "; --json has all\n";
+  }
+
+ private:
+  void begin(const rr::Json& cells) {
+    std::cout << time_names_;
+    for (const auto& [place, cell] : cells.items()) {
+      columns_.push_back(place);
+      std::cout << "," << csv_cell(place.empty() ? "value" : place);
+    }
+    std::cout << "\n";
+    for (const auto& times : std::exchange(waiting_, {}))
+      std::cout << times << std::string(columns_.size(), ',') << "\n";
+    std::cout << std::flush;
+  }
+
+  bool may_have_numbers_ = true;
+  std::string time_names_;
+  std::vector<std::string> columns_;
+  std::vector<std::string> waiting_;  ///< rows without a number, before the columns are known
+  std::uint64_t without_column_ = 0;  ///< numbers of longer values
+};
+
 /// Prints what comes, and counts it. Values of wires have the time at which the device sent them, and their age.
 class ValuePrinter {
  public:
@@ -79,34 +136,23 @@ class ValuePrinter {
     line["value"] = value;
     std::cout << rr::write_json(line) << std::endl;
   }
+  void expect_no_numbers() { table_.expect_no_numbers(); }
+  /// Nothing comes any more.
+  void end() { table_.end(); }
   std::uint64_t count() const { return count_; }
   bool is_done() const { return limit_ != 0 && count_ >= limit_; }
 
  private:
-  /// A column for each number of the first value, named by its place: "/position/0".
   void print_csv(const rr::OrderedJson& value, rr::TimeSpec now, std::optional<rr::TimeSpec> sent) {
-    const auto cells = rr::Json::parse(rr::write_json(value)).flatten();
-    if (columns_.empty()) {
-      std::cout << "time" << (sent ? ",device_time,age" : "");
-      for (const auto& [place, cell] : cells.items()) {
-        columns_.push_back(place);
-        std::cout << "," << csv_cell(place.empty() ? "value" : place);
-      }
-      std::cout << "\n";
-    }
-    std::cout << rr::format_utc(now, 3);
-    if (sent) std::cout << "," << rr::format_utc(*sent, 3) << "," << age_text(age_of(*sent, now));
-    for (const auto& column : columns_) {
-      const auto cell = cells.find(column);
-      std::cout << "," << (cell == cells.end() ? "" : csv_cell(*cell));
-    }
-    std::cout << std::endl;
+    auto times = rr::format_utc(now, 3);
+    if (sent) times += "," + rr::format_utc(*sent, 3) + "," + age_text(age_of(*sent, now));
+    table_.print(rr::Json::parse(rr::write_json(value)), sent ? "time,device_time,age" : "time", times);
   }
 
   WatchForm form_;
   std::uint64_t limit_;
   std::uint64_t count_ = 0;
-  std::vector<std::string> columns_;
+  CsvTable table_;
 };
 
 /// Returns  whether the service still has open what is watched.
@@ -114,6 +160,9 @@ std::function<bool()> begin_watching(const RemoteMember& found, ValuePrinter& pr
   using enum rr::MemberKind;
   expect_kind(found, {wire, pipe, event}, "watch");
   const auto& member = *found.member;
+  if (member.direction() == rr::MemberDirection::writeonly)
+    throw NotUnderstood(std::string(rr::member_kind_name(member.kind)) + " " + rr::quote(member.name) +
+                        " is writeonly: the device sends nothing");
   const auto json_of = [&member, types = &found.types()](const rr::Value& value) {
     return to_json(value, member.type, *types);
   };
@@ -133,6 +182,7 @@ std::function<bool()> begin_watching(const RemoteMember& found, ValuePrinter& pr
     connection.on_path_released([is_closed, path = found.object.path()](const std::string& released) {
       if (rr::is_within(path, released)) *is_closed = true;
     });
+    if (member.parameters.empty()) printer.expect_no_numbers();
     found.object.on_event(member.name, [&printer, &member, types = &found.types()](std::span<const rr::Value> values) {
       const auto json = rr::arguments_to_json(values, member, *types, {});
       if (!json) throw rr::ClientException(json.error());
@@ -158,11 +208,9 @@ void watch(const RemoteMember& found, ValuePrinter& printer, std::optional<stead
   while (!is_over()) connection.run_until(is_over, std::chrono::milliseconds(100));
   if (!is_open() || connection.is_closed())
     connection.run_until([] { return true; }, print_limit);  // what came before the end
+  printer.end();
   const std::chrono::duration<double> seconds = steady_clock::now() - begin;
   std::cerr << printer.count() << " values in " << std::fixed << std::setprecision(1) << seconds.count() << " s, "
-  if (member.direction() == rr::MemberDirection::writeonly)
-    throw NotUnderstood(std::string(rr::member_kind_name(member.kind)) + " " + rr::quote(member.name) +
-                        " is writeonly: the device sends nothing");
             << static_cast<double>(printer.count()) / seconds.count() << " /s\n";
   if (is_open() && !connection.is_closed()) return;
   if (!connection.is_closed()) *end = "the service has closed it";

@@ -204,6 +204,30 @@ def test_values_are_watched(url):
     assert {row.count(",") for row in rows} == {header.count(",")}
 
 
+def test_rows_without_numbers_are_shown(interop):
+    run("call", interop, "publish_state", "[]")
+    header, row = run("watch", interop, "state", "--csv", "--count", "1").splitlines()
+    assert header == "time,device_time,age,value" and row.endswith(",")
+    watching = subprocess.Popen([RRGATE, "watch", interop, "cleared", "--csv"], stdout=subprocess.PIPE, text=True)
+    while not select.select([watching.stdout], [], [], 0.1)[0]:
+        run("call", interop, "clear")
+    assert watching.stdout.readline() == "time,value\n"
+    watching.terminate()
+    watching.communicate()
+
+
+def test_a_table_has_the_columns_of_the_first_value_with_numbers(tmp_path):
+    port = free_port()
+    device = Background([sys.executable, PEERS / "growing_lists.py", port], tmp_path / "log")
+    try:
+        device.next_line()
+        ran = Ran(["watch", f"rr+tcp://127.0.0.1:{port}/?service=device", "lists", "--csv", "--count", "3"])
+        assert [line.split(",")[1:] for line in ran.out.splitlines()] == [["/0", "/1"], ["", ""], ["1.5", "2.5"], ["3.5", "4.5"]]
+        assert ran.code == DONE and ran.error.startswith("numbers without a column: 1; --json has all\n")
+    finally:
+        device.stop()
+
+
 def test_what_a_device_only_takes_is_not_watched(interop):
     assert Ran(["watch", interop, "target"]).refused(NOT_UNDERSTOOD, "wire 'target' is writeonly")
     assert Ran(["watch", interop, "taken"]).refused(NOT_UNDERSTOOD, "pipe 'taken' is writeonly")
