@@ -23,6 +23,13 @@ Milliseconds time_request(const rr::RemoteObject& root) {
   return steady_clock::now() - begin;
 }
 
+/// A gateway that shares a device is the node that answers, whether the device is there or not.
+void tell_who_answers(const rr::RemoteObject& root) {
+  const auto* mode = root.connection().attributes().find("rrgate.mode");
+  if (!mode || *mode != rr::Value("shared")) return;
+  std::cerr << "the gateway answers, not the device; rrgate bench URL PROPERTY asks the device\n";
+}
+
 /// So many requests, one after the other. Throws   rr::Exception: one has failed.
 std::vector<Milliseconds> time_requests(const rr::RemoteObject& root, std::uint32_t count) {
   std::vector<Milliseconds> times;
@@ -104,6 +111,7 @@ struct PingOptions : RemoteOptions {
 int ping(const PingOptions& options) {
   return run_remote("ping", options.url, [&] {
     const auto root = open_service(remote_address(options));
+    tell_who_answers(root);
     print_times(time_requests(root, options.count), options.is_json);
   });
 }
@@ -116,7 +124,10 @@ struct BenchOptions : PingOptions {
 int bench(const BenchOptions& options) {
   return run_remote("bench", options.url, [&] {
     auto found = find_member(open_service(remote_address(options)), options.property);
-    if (found.member) expect_kind(found, {rr::MemberKind::property}, "bench");
+    if (found.member)
+      expect_kind(found, {rr::MemberKind::property}, "bench");
+    else
+      tell_who_answers(found.object);
     const auto begin = steady_clock::now();
     auto times = time_requests(found.object, found.member ? found.member->name : "", options.count, options.parallel);
     print_times(std::move(times), options.is_json, steady_clock::now() - begin);

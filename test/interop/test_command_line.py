@@ -316,6 +316,10 @@ def test_requests_are_timed(url):
     assert times["count"] == 20
     assert 0 < times["min_ms"] <= times["p50_ms"] <= times["p99_ms"] <= times["max_ms"]
     assert run("ping", url, "--count", "20").startswith("20 requests: min ")
+    is_shared = "rrgate.mode" in run("info", url)
+    for command in (["ping", url], ["bench", url]):
+        assert ("the gateway answers, not the device" in Ran([*command, "--count", "1"]).error) == is_shared
+    assert Ran(["bench", url, "color", "--count", "1"]).error == ""
 
 
 def test_the_times_of_requests_are_counted_by_class(slow_reynard):
