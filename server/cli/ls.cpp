@@ -12,6 +12,7 @@
 #include <iostream>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "node/discovery/discovery.hpp"
 #include "server/cli/printable.hpp"
@@ -196,11 +197,45 @@ void print_services(const std::vector<FoundService>& services, std::string_view 
   std::cout << std::flush;
 }
 
+/// Those that can be used: a node that tells nothing has none, nor has a device that its gateway does not reach.
+std::vector<FoundService> list_usable_services(const ListOptions& options) {
+  auto out = list_services(options);
+  std::erase_if(out, [](const auto& each) { return !each.problem.empty(); });
+  return out;
+}
+
+/// The services of a node or gateway that was there: none while it is away, which is told once.
+class WatchedPlace {
+ public:
+  explicit WatchedPlace(const ListOptions& options) : options_(options) {}
+
+  /// Throws   rr::Exception: the first time that it can't be reached; it refuses.
+  std::vector<FoundService> services() {
+    try {
+      auto out = list_usable_services(options_);
+      state_ = State::reached;
+      return out;
+    } catch (const rr::Exception& failure) {
+      if (state_ == State::unknown || exit_code_of(failure) != exit_unreachable) throw;
+      if (std::exchange(state_, State::away) == State::reached)
+        std::cerr << "rrgate ls: " << options_.url << ": " << printable(failure.what()) << "; waiting for it\n";
+      return {};
+    }
+  }
+
+ private:
+  enum class State : std::uint8_t { unknown, reached, away };
+
+  const ListOptions& options_;
+  State state_ = State::unknown;
+};
+
 /// What was not there before, and what has gone, until the program is ended.
 void watch_services(const ListOptions& options) {
+  WatchedPlace place(options);
   std::vector<FoundService> before;
   while (true) {
-    const auto now = list_services(options);
+    const auto now = place.services();
     std::vector<FoundService> lost;
     std::vector<FoundService> found;
     std::set_difference(before.begin(), before.end(), now.begin(), now.end(), std::back_inserter(lost));

@@ -32,27 +32,6 @@ std::string authorization(const StoredLogin& login) {
   return {};
 }
 
-int exit_code_of(rr::ErrorCode code) {
-  using enum rr::ErrorCode;
-  switch (code) {
-    case connection_error:
-    case request_timeout:
-    case node_not_found:
-    case service_not_found:
-    case endpoint_communication_fatal_error:
-      return exit_unreachable;
-    case authentication_error:
-    case permission_denied:
-    case object_locked_error:
-      return exit_refused;
-    case read_only_member:
-    case write_only_member:
-      return exit_usage;
-    default:
-      return exit_device_error;
-  }
-}
-
 /// What a gateway refuses a WebSocket for, it says in HTTP.
 bool is_refusal(std::string_view text) {
   return text.find("refused with status 401") != std::string_view::npos ||
@@ -265,6 +244,28 @@ void print_value(const rr::OrderedJson& json, bool is_json) {
   std::cout << std::endl;  // whoever reads a pipe sees each value as it comes
 }
 
+int exit_code_of(const rr::Exception& failure) {
+  using enum rr::ErrorCode;
+  if (is_refusal(failure.what())) return exit_refused;
+  switch (failure.error().code) {
+    case connection_error:
+    case request_timeout:
+    case node_not_found:
+    case service_not_found:
+    case endpoint_communication_fatal_error:
+      return exit_unreachable;
+    case authentication_error:
+    case permission_denied:
+    case object_locked_error:
+      return exit_refused;
+    case read_only_member:
+    case write_only_member:
+      return exit_usage;
+    default:
+      return exit_device_error;
+  }
+}
+
 int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run) {
   const auto tell = [&](std::string_view what, int code) {
     std::cerr << "rrgate " << command << ": " << url << ": " << printable(what) << "\n";
@@ -276,7 +277,7 @@ int run_remote(std::string_view command, std::string_view url, const std::functi
   } catch (const NotUnderstood& mistake) {
     return tell(mistake.what(), exit_usage);
   } catch (const rr::Exception& failure) {
-    return tell(failure.what(), is_refusal(failure.what()) ? exit_refused : exit_code_of(failure.error().code));
+    return tell(failure.what(), exit_code_of(failure));
   } catch (const std::exception& failure) {
     return tell(failure.what(), exit_failed);
   }

@@ -89,6 +89,8 @@ std::string text_for_output(const std::string& text);
 /// For people: text without quotes, structures over several lines. With --json: one line.
 void print_value(const rr::OrderedJson& json, bool is_json);
 
+/// One of RemoteExitCode, or exit_usage.
+int exit_code_of(const rr::Exception& failure);
 /// Runs a command: what it throws becomes one sentence and an exit code. Without `run`'s throwing: exit_ok.
 int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run);
 

@@ -129,6 +129,14 @@ def test_an_argument_may_be_a_file(reynard, tmp_path):
     assert Ran(["set", reynard, "color", "@nowhere"]).refused(NOT_UNDERSTOOD, "'nowhere'")
 
 
+@pytest.fixture
+def interop(tmp_path):
+    """The test service, directly."""
+    service, url = start_service(tmp_path)
+    yield url
+    service.stop()
+
+
 def test_a_line_end_is_no_part_of_what_is_read(interop, tmp_path):
     def is_refused(member, file, *words):
         return Ran(["set", interop, member, f"@{file}"]).refused(NOT_UNDERSTOOD, "file '/", *words)
@@ -145,14 +153,6 @@ def test_a_line_end_is_no_part_of_what_is_read(interop, tmp_path):
     file.write_bytes(b"many\n")
     assert is_refused("p_double", file, "is not JSON")
     assert Ran(["set", interop, "p_double", "-"], given="many").refused(NOT_UNDERSTOOD, "standard input is not JSON")
-
-
-@pytest.fixture
-def interop(tmp_path):
-    """The test service, directly."""
-    service, url = start_service(tmp_path)
-    yield url
-    service.stop()
 
 
 def test_what_a_service_has_is_told(url):
@@ -204,18 +204,6 @@ def test_values_are_watched(url):
     assert {row.count(",") for row in rows} == {header.count(",")}
 
 
-def test_rows_without_numbers_are_shown(interop):
-    run("call", interop, "publish_state", "[]")
-    header, row = run("watch", interop, "state", "--csv", "--count", "1").splitlines()
-    assert header == "time,device_time,age,value" and row.endswith(",")
-    watching = subprocess.Popen([RRGATE, "watch", interop, "cleared", "--csv"], stdout=subprocess.PIPE, text=True)
-    while not select.select([watching.stdout], [], [], 0.1)[0]:
-        run("call", interop, "clear")
-    assert watching.stdout.readline() == "time,value\n"
-    watching.terminate()
-    watching.communicate()
-
-
 def test_a_table_has_the_columns_of_the_first_value_with_numbers(tmp_path):
     port = free_port()
     device = Background([sys.executable, PEERS / "growing_lists.py", port], tmp_path / "log")
@@ -226,6 +214,18 @@ def test_a_table_has_the_columns_of_the_first_value_with_numbers(tmp_path):
         assert ran.code == DONE and ran.error.startswith("numbers without a column: 1; --json has all\n")
     finally:
         device.stop()
+
+
+def test_rows_without_numbers_are_shown(interop):
+    run("call", interop, "publish_state", "[]")
+    header, row = run("watch", interop, "state", "--csv", "--count", "1").splitlines()
+    assert header == "time,device_time,age,value" and row.endswith(",")
+    watching = subprocess.Popen([RRGATE, "watch", interop, "cleared", "--csv"], stdout=subprocess.PIPE, text=True)
+    while not select.select([watching.stdout], [], [], 0.1)[0]:
+        run("call", interop, "clear")
+    assert watching.stdout.readline() == "time,value\n"
+    watching.terminate()
+    watching.communicate()
 
 
 def test_what_a_device_only_takes_is_not_watched(interop):
@@ -461,6 +461,41 @@ def test_what_comes_and_goes_is_told():
         device.communicate()
         watching.kill()
         watching.communicate()
+
+
+def test_what_a_gateway_reaches_comes_and_goes(tmp_path):
+    """The device, and the gateway itself."""
+    port = free_port()
+
+    def start_robot():
+        return Background([BUILD / "examples" / "demo" / "rrgate-demo-create", "--port", port], tmp_path / "log")
+
+    robot = start_robot()
+    gateway = Gateway(tmp_path, {"devices": [{"name": "create", "url": f"rr+tcp://127.0.0.1:{port}/?service=Create"}],
+                                 "retry": {"min_ms": 50, "max_ms": 200}})
+    base = f"http://127.0.0.1:{gateway.port}"
+    watching = subprocess.Popen([RRGATE, "ls", "--watch", "--wait", "1", "--json", base], stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True)
+    told = (each for each in map(json.loads, watching.stdout) if each["service"] == "Create")
+    try:
+        assert next(told)["change"] == "found"
+        robot.stop()
+        assert next(told)["change"] == "lost"
+        robot = start_robot()
+        assert next(told)["change"] == "found"
+        gateway.process.stop()
+        assert next(told)["change"] == "lost"
+        gateway.start()
+        assert next(told)["change"] == "found"
+        watching.kill()
+        said = watching.communicate()[1]
+        assert said.count("\n") == 1 and base in said and said.endswith("waiting for it\n")
+    finally:
+        watching.kill()
+        watching.communicate()
+        gateway.process.stop()
+        robot.stop()
+    assert Ran(["ls", "--watch", base]).refused(UNREACHABLE, base)
 
 
 def complete(*words):
