@@ -11,6 +11,7 @@
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
 #include "node/client/unread_reply.hpp"
+#include "node/driver/post_cancel.hpp"
 #include "node/values/exception.hpp"
 
 namespace rr {
@@ -50,7 +51,7 @@ awaitable<void> dial_and_start(std::vector<ConnectionUrl> urls, ConnectOptions o
 
 void ClientOpening::cancel() {
   if (std::exchange(is_over_, true)) return;
-  dialing_.emit(asio::cancellation_type::terminal);
+  post_cancel(executor_, dialing_);
   if (const auto connection = connection_.lock())
     connection->close(make_error(ErrorCode::operation_cancelled, "connecting was given up"));
 }
@@ -68,7 +69,7 @@ void ClientConnection::open(std::unique_ptr<ByteStream> stream, ConnectOptions o
 
 std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std::string_view url,
                                                       ConnectOptions options, Opened done) {
-  const auto opening = std::make_shared<ClientOpening>();
+  const auto opening = std::make_shared<ClientOpening>(io.get_executor());
   auto tell = [opening, done = std::move(done)](Result<std::shared_ptr<ClientConnection>> opened) {
     if (!std::exchange(opening->is_over_, true)) done(std::move(opened));
   };
@@ -95,7 +96,7 @@ std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std:
   asio::post(io, [&io, opening, work = std::move(work)]() mutable {
     if (opening->is_over_) return;
     const auto keep = [opening](std::exception_ptr) {};  // the coroutine uses the slot until this is called
-    asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_.slot(), keep));
+    asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_->slot(), keep));
   });
   return opening;
 }

@@ -1,6 +1,7 @@
 // A client of one service, with callbacks. Layer: node/client.
 #pragma once
 
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/io_context.hpp>
 #include <functional>
@@ -39,6 +40,7 @@ struct ConnectOptions : ClientOptions {
 /// A connection that is being opened.
 class ClientOpening {
  public:
+  explicit ClientOpening(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
   /// Gives it up: sockets are closed and nobody is told. Nothing happens once it is open or has failed.
   void cancel();
   bool is_over() const { return is_over_; }
@@ -47,7 +49,9 @@ class ClientOpening {
 
  private:
   friend class ClientConnection;
-  boost::asio::cancellation_signal dialing_;
+  const boost::asio::any_io_executor executor_;
+  const std::shared_ptr<boost::asio::cancellation_signal> dialing_ =
+      std::make_shared<boost::asio::cancellation_signal>();
   std::weak_ptr<ClientConnection> connection_;  ///< while the session is being opened
   bool is_over_ = false;
 };

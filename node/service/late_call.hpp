@@ -9,6 +9,7 @@
 
 #include "core/support/error.hpp"
 #include "core/types/value.hpp"
+#include "node/driver/post_cancel.hpp"
 #include "node/service/blocking_pool.hpp"
 #include "node/service/caller.hpp"
 #include "node/service/node_thread.hpp"
@@ -39,9 +40,9 @@ class LateCall {
   void run_blocking(std::function<void()> job) { pool_.run(caller_.id, std::move(job)); }
   const boost::asio::any_io_executor& executor() const { return executor_; }
   /// For the coroutine that answers.
-  boost::asio::cancellation_slot cancellation_slot() { return cancelled_.slot(); }
+  boost::asio::cancellation_slot cancellation_slot() { return cancelled_->slot(); }
   /// Nobody waits for the answer any more.
-  void cancel() { cancelled_.emit(boost::asio::cancellation_type::terminal); }
+  void cancel() { post_cancel(executor_, cancelled_); }
 
  private:
   const std::shared_ptr<NodeThread> thread_;
@@ -51,7 +52,8 @@ class LateCall {
   std::shared_ptr<const void> needed_;
   Done done_;
   std::atomic<bool> is_answered_ = false;
-  boost::asio::cancellation_signal cancelled_;
+  const std::shared_ptr<boost::asio::cancellation_signal> cancelled_ =
+      std::make_shared<boost::asio::cancellation_signal>();
 };
 
 }  // namespace rr

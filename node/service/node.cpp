@@ -17,6 +17,7 @@
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
 #include "node/driver/accept.hpp"
+#include "node/driver/post_cancel.hpp"
 #include "node/platform/node_id_store.hpp"
 #include "node/service/login_judge.hpp"
 #include "node/service/service_client.hpp"
@@ -434,7 +435,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     local_.reset();
     intra_.reset();
     listens_.clear();
-    for (const auto& arrival : std::exchange(arriving_, {})) arrival->emit(asio::cancellation_type::terminal);
+    for (const auto& arrival : std::exchange(arriving_, {})) post_cancel(io_.get_executor(), arrival);
     for (const auto& job : repeats_) {
       job->is_stopped = true;
       job->timer.cancel();

@@ -8,12 +8,12 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <list>
 #include <map>
 #include <set>
 
 #include "core/discovery/service_refresh.hpp"
 #include "node/driver/clocks.hpp"
+#include "node/driver/post_cancel.hpp"
 
 namespace rr {
 
@@ -65,7 +65,7 @@ class TypeFollower : public std::enable_shared_from_this<TypeFollower> {
     discovery_.unwatch(watch_);
     timer_.cancel();
     nodes_.clear();
-    for (auto& query : queries_) query.emit(asio::cancellation_type::terminal);
+    for (const auto& query : queries_) post_cancel(discovery_.io_context().get_executor(), query);
     core_.reset();
   }
 
@@ -104,7 +104,7 @@ class TypeFollower : public std::enable_shared_from_this<TypeFollower> {
   }
 
   void begin_query(const FoundNode& node) {
-    const auto query = queries_.emplace(queries_.end());
+    const auto query = *queries_.insert(std::make_shared<asio::cancellation_signal>()).first;
     ServiceQueryOptions options;
     options.dial.tls = core_->options().connect.dial.tls;
     auto urls = candidate_urls(node.info, filter_.transport_schemes);
@@ -178,7 +178,7 @@ class TypeFollower : public std::enable_shared_from_this<TypeFollower> {
   std::shared_ptr<SubscriptionCore> core_;  ///< null once it has ended
   Discovery::WatchId watch_ = 0;
   std::map<NodeId, FoundNode> nodes_;
-  std::list<asio::cancellation_signal> queries_;
+  std::set<std::shared_ptr<asio::cancellation_signal>> queries_;  ///< under way
   asio::steady_timer timer_;
 };
 

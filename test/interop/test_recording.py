@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -113,10 +114,10 @@ def test_services_are_recorded_by_their_type_and_by_the_name_of_a_gateways_devic
             file = tmp_path / f"{number}.mcap"
             rrgate("record", *words, "-o", file, "--duration", 1)
             assert "/Create/state" in {topic for topic, _, _ in messages(file)}
-        said = rrgate("record", base, "--type", "com.example.Arm", "-o", tmp_path / "none.mcap", code=3)
         other = create.replace("service=Create", "service=Other")  # the URL says which of the node's services
         said = rrgate("record", other, "--type", "experimental.create2.Create", "-o", tmp_path / "none.mcap", code=3)
         assert "no service of type experimental.create2.Create" in said and not (tmp_path / "none.mcap").exists()
+        said = rrgate("record", base, "--type", "com.example.Arm", "-o", tmp_path / "none.mcap", code=3)
         assert "no service of type com.example.Arm" in said and not (tmp_path / "none.mcap").exists()
         assert "--type" in rrgate("record", "-o", tmp_path / "none.mcap", code=2)
     finally:
@@ -321,11 +322,20 @@ def test_a_long_recording_goes_on_in_further_files_and_the_oldest_go(create, tmp
     assert all(len(messages(file)) > 0 for file in files)
 
 
-def test_mistakes_are_told(create, of_create, tmp_path):
-    path = tmp_path / "a.mcap"
-    assert "is there already; --force replaces it" in rrgate("record", create, "-o", of_create, "--duration", "1", code=2)
-    assert "Connection refused" in rrgate("record", f"rr+tcp://127.0.0.1:{free_port()}/?service=a", "-o", path, code=3)
-    assert "/no/such/a.mcap: can't be written: No such file" in rrgate("record", create, "-o", "/no/such/a.mcap", code=1)
+def test_a_recording_ends_while_its_service_has_not_answered(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        silent.settimeout(REPLAY_DEADLINE)
+        url = f"rr+tcp://127.0.0.1:{silent.getsockname()[1]}/?service=a"
+        recording = subprocess.Popen([RRGATE, "record", url, "-o", tmp_path / "a.mcap"], stderr=subprocess.PIPE, text=True)
+        with silent.accept()[0] as client:
+            client.settimeout(REPLAY_DEADLINE)
+            assert client.recv(1)  # it opens a session
+            recording.send_signal(signal.SIGINT)
+            said = recording.communicate(timeout=REPLAY_DEADLINE)[1]
+    assert recording.returncode == 0 and said.startswith("0 messages of 0 members"), said
+    assert messages(tmp_path / "a.mcap") == []  # the file is complete
+
+
 def test_what_an_interrupted_recording_was_to_replace_is_kept(create, tmp_path):
     path, before = tmp_path / "a.mcap", tmp_path / "a.mcap.before"
     path.write_text("the interrupted one")
@@ -338,6 +348,11 @@ def test_what_an_interrupted_recording_was_to_replace_is_kept(create, tmp_path):
     assert messages(path) and list(tmp_path.iterdir()) == [path]
 
 
+def test_mistakes_are_told(create, of_create, tmp_path):
+    path = tmp_path / "a.mcap"
+    assert "is there already; --force replaces it" in rrgate("record", create, "-o", of_create, "--duration", "1", code=2)
+    assert "Connection refused" in rrgate("record", f"rr+tcp://127.0.0.1:{free_port()}/?service=a", "-o", path, code=3)
+    assert "/no/such/a.mcap: can't be written: No such file" in rrgate("record", create, "-o", "/no/such/a.mcap", code=1)
     told = rrgate("record", create, "-o", path, "--members", "nonesuch", code=2)
     assert "'nonesuch': no member to record; " in told and "DistanceTraveled" in told
     assert not path.exists()

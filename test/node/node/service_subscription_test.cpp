@@ -349,6 +349,25 @@ TEST_CASE("closing a subscription ends what waits for it, wherever it is") {
   CHECK(ends == std::vector<std::string>{"light: the subscription is closed", "the subscription is closed"});
 }
 
+TEST_CASE("a subscription may be closed between two runs of its loop, while the service has not answered") {
+  asio::io_context io;
+  asio::ip::tcp::acceptor silent(io, {asio::ip::make_address("127.0.0.1"), 0});
+  const auto url = "rr+tcp://127.0.0.1:" + std::to_string(silent.local_endpoint().port()) + "/?service=Lamp";
+  auto lamps = subscribe_service(io, url, quick());
+  asio::ip::tcp::socket client(io);
+  std::array<char, 1> first_byte{};
+  bool is_asked = false;  // the session is being opened
+  silent.async_accept(client, [&](const auto&) {
+    client.async_read_some(asio::buffer(first_byte), [&](const auto& error, std::size_t) { is_asked = !error; });
+  });
+  while (!is_asked && io.run_one_for(5s) > 0) {
+  }
+  REQUIRE(is_asked);
+  lamps.close();
+  io.run_for(5s);
+  CHECK(io.stopped());  // it was out of work
+}
+
 TEST_CASE("a handler may close the subscription, and let go of it") {
   LampNode lamp;
   asio::io_context io;
