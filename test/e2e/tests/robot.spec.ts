@@ -246,6 +246,25 @@ test("sensor packets and camera pictures arrive", async ({ page }) => {
   }).toPass();
 });
 
+test("a camera that has sent no picture shows none of another one's", async ({ page, lab }) => {
+  const camera = page.getByRole("region", { name: "Camera" });
+  const width = () => camera.locator("canvas").evaluate((canvas: HTMLCanvasElement) => canvas.width);
+  await expect.poll(width).toBe(320);
+  const choice = camera.getByRole("combobox", { name: "Camera" });
+  const [first, second] = await choice.locator("option").allInnerTexts();
+  lab.webcams.signal("SIGSTOP");
+  try {
+    await choice.selectOption({ label: second ?? "" });
+    await expect(camera.getByRole("img", { name: `Picture from camera ${second}` })).toBeVisible();
+    await expect(camera).toContainText("Waiting for the first picture");
+    expect(await width()).toBe(4); // nothing was drawn
+  } finally {
+    lab.webcams.signal("SIGCONT");
+  }
+  await expect.poll(width).toBe(320);
+  await choice.selectOption({ label: first ?? "" });
+});
+
 test("a snapshot comes through the camera's memory", async ({ page }) => {
   const camera = page.getByRole("region", { name: "Camera" });
   await camera.getByRole("button", { name: "Snapshot" }).click();

@@ -94,6 +94,7 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
     <>
       <div class={`camera-frame ${note !== null && hasFrame ? "is-stale" : ""}`}>
         <canvas
+          key={index}
           ref={canvas}
           width={4}
           height={3}
@@ -166,23 +167,30 @@ interface Frames {
   age: string | null;
 }
 
+const NO_FRAMES: Omit<Frames, "age"> = { failure: null, hasFrame: false, size: "" };
+
 function useFrames(
   canvas: { current: HTMLCanvasElement | null },
   remote: Remote | null,
   index: number | null,
   shown: boolean,
 ): Frames {
-  const [frames, setFrames] = useState<Omit<Frames, "age">>({ failure: null, hasFrame: false, size: "" });
+  const [frames, setFrames] = useState(NO_FRAMES);
   const drawnAt = useRef<number | null>(null);
   const age = useAge(() => drawnAt.current);
   useEffect(() => {
+    drawnAt.current = null;
+    setFrames(NO_FRAMES);
+  }, [index]);
+  useEffect(() => {
     if (!remote || index === null || !shown) return;
+    const on = canvas.current; // each camera has a canvas of its own: what comes late from another one is drawn where nobody sees it
     const stop = new AbortController();
     const follow = async (): Promise<void> => {
       const camera = await remote.child("Webcams", index);
       for await (const frame of framesOf(camera, stop.signal)) {
         if (document.hidden) continue;
-        const size = await drawFrame(canvas.current, frame);
+        const size = await drawFrame(on, frame);
         if (stop.signal.aborted) return;
         drawnAt.current = performance.now();
         setFrames((old) => (old.failure === null && old.size === size ? old : { failure: null, hasFrame: true, size }));
