@@ -102,6 +102,36 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
   await third.context().close();
 });
 
+test("the address has the board that this browser kept, and an address that is opened again shows its own", async ({
+  page,
+  lab,
+}) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  const notes = page.locator('[data-panel="notes"]').getByRole("textbox", { name: "Notes", exact: true });
+  await notes.fill("first");
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  const first = page.url();
+  await notes.fill("second");
+  await expect(page).not.toHaveURL(first);
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  const second = page.url();
+
+  await page.goto("about:blank");
+  await openBoard(page, lab.url);
+  await expect(notes).toHaveValue("second");
+  await expect(page).toHaveURL(second);
+
+  const open = (address: string) => page.evaluate((to) => void (location.href = to), address);
+  await open(first);
+  await expect(notes).toHaveValue("first");
+  await notes.fill("third");
+  await expect(page).not.toHaveURL(first);
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  await open(first);
+  await expect(notes).toHaveValue("first");
+});
+
 test("a plot shows several members, in the address and after a reload", async ({ page, lab }) => {
   await openBoard(page, lab.url);
   await arrange(page);

@@ -191,6 +191,8 @@ interface BoardState {
 function useBoard(key: string, route: ServiceRoute, preset: Board | null): BoardState {
   const [chosen, setChosen] = useState<{ key: string; board: Board } | null>(null);
   const [trouble, setTrouble] = useState<string | null>(null);
+  const address = formatRoute(route.device, route.service, route.path, "board");
+  const show = (board: Board): void => history.replaceState(null, "", `${address}&board=${packBoard(board)}`);
   useEffect(() => {
     setTrouble(null);
     let found: Board | null = null;
@@ -203,7 +205,8 @@ function useBoard(key: string, route: ServiceRoute, preset: Board | null): Board
     }
     found ??= recallBoard(key);
     setChosen(found && { key, board: found });
-  }, [key, route.board]);
+    if (found && route.board === null) show(found);
+  }, [key, route]); // each time that an address is opened, also one that the page had before it was changed here
   const keeper = useMemo(() => new Keeper(), []);
   useEffect(() => {
     const leave = (): void => keeper.flush(true);
@@ -212,15 +215,14 @@ function useBoard(key: string, route: ServiceRoute, preset: Board | null): Board
       window.removeEventListener("pagehide", leave);
       keeper.flush(false);
     };
-  }, [key, keeper]);
+  }, [route, keeper]);
   const shown = chosen?.key === key ? chosen.board : preset;
   const setBoard = (board: Board, isPreset = false): void => {
     if (!isPreset && shown && sameBoard(shown, board)) return; // a finger that moves within a cell
     setChosen({ key, board });
-    const address = formatRoute(route.device, route.service, route.path, "board");
     keeper.write({
       store: () => keepBoard(key, isPreset ? null : board),
-      show: () => history.replaceState(null, "", isPreset ? address : `${address}&board=${packBoard(board)}`),
+      show: () => (isPreset ? history.replaceState(null, "", address) : show(board)),
     });
   };
   return { board: shown, isKept: useStore(keeper.isKept), trouble, setBoard, setTrouble };
