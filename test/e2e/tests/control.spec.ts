@@ -29,6 +29,17 @@ test("the first command takes control, which can be given back", async ({ page }
   await expect(control(page)).toHaveAttribute("data-control", "idle");
 });
 
+test("a key that is held when control is given back is held no more", async ({ page }) => {
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await expect(forward(page)).toHaveAttribute("aria-pressed", "true");
+  await page.getByRole("button", { name: "Give back" }).click();
+  await waitUntilStopped(page);
+  await expect(forward(page)).toHaveAttribute("aria-pressed", "false");
+  await expect(control(page)).toHaveAttribute("data-control", "idle");
+  await page.keyboard.up("ArrowUp");
+});
+
 test("who has control keeps others out until they take over, who is told then and stops", async ({
   page,
   context,

@@ -13,6 +13,7 @@ export interface Driving {
   held: ReadonlySet<Direction>;
   press: (source: string, direction: Direction) => void;
   release: (source: string) => void;
+  letGo: () => void;
   /** Lets go of everything and stops the robot, whoever moves it; `unsent` hears where that cannot be sent. */
   stop: () => void;
 }
@@ -103,7 +104,7 @@ export function useDriving(
     };
   }, [shown, press, release, letGo, stop]);
 
-  return { held, press, release, stop };
+  return { held, press, release, letGo, stop };
 }
 
 function takesKeys(target: EventTarget | null): boolean {

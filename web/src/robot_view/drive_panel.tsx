@@ -1,7 +1,7 @@
 // The controls: four directions and stop, to hold with mouse, fingers or keys, and the speed.
 // Layer: web/robot_view.
 
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { Control } from "../robot/control";
 import type { Driver } from "../robot/driver";
@@ -10,7 +10,7 @@ import { SPEED_MAX, SPEED_MIN } from "../robot/steering";
 import type { Direction, DriveCommand } from "../robot/steering";
 import { useDriving } from "../robot/use_driving";
 import type { Driving } from "../robot/use_driving";
-import { ControlLine } from "../ui/control_line";
+import { ControlLine, useControlKind } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { ArrowIcon } from "../ui/icons";
 import "./pad.css";
@@ -42,6 +42,10 @@ export function DrivePanel({
 }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, { enabled, shown, unsent });
+  const isIdle = useControlKind(control) === "idle";
+  useEffect(() => {
+    if (isIdle) driving.letGo(); // what is held when control is given back drives no more
+  }, [isIdle]);
   return (
     <section class="panel drive" aria-labelledby="drive-title">
       <h2 id="drive-title" class="unseen">

@@ -25,8 +25,12 @@ export function useControl(object: Remote | null): InControl {
   const last = useRef(control);
   last.current = control ?? last.current;
   useEffect(() => control?.use(), [control]);
-  const { kind } = useStore(last.current?.state ?? NOBODY);
+  const kind = useControlKind(last.current);
   return { control, last: last.current, isOpen: control !== null && kind !== "lost" && kind !== "doubtful" };
+}
+
+export function useControlKind(control: Control | null): ControlState["kind"] {
+  return useStore(control?.state ?? NOBODY).kind;
 }
 
 export interface ControlLineProps {
