@@ -101,3 +101,27 @@ test("the fields of a memory say what they are, and its value stands below them"
     expect(value?.y, label).toBeGreaterThanOrEqual((field?.y ?? Infinity) + (field?.height ?? 0));
   }
 });
+
+test("values of a device that is lost are marked old, and one that freezes is said not to answer", async ({
+  page,
+  lab,
+}) => {
+  await page.goto(`${lab.url}#/devices/create/Create?view=members`);
+  const property = page.locator('[data-member="DistanceTraveled"]');
+  await expect(property.locator("output")).toHaveText(/^-?\d+$/);
+  await expect(page.locator('[data-member="state"]')).toContainText("values a second");
+  lab.create.signal("SIGSTOP");
+  try {
+    await expect(page.locator("main").getByRole("alert").first()).toContainText("The device has not answered for");
+    await expect(page.locator('[data-member="state"] .wire')).toHaveClass(/is-stale/);
+  } finally {
+    lab.create.signal("SIGCONT");
+  }
+  await expect(page.getByText("The device has not answered for")).toBeHidden();
+  await expect(property.locator(".is-stale")).toHaveCount(0);
+
+  await lab.create.kill();
+  await expect(property.locator(".is-stale")).toContainText(/Stale: \d+ s old/);
+  lab.create.start();
+  await expect(property.locator(".is-stale")).toHaveCount(0);
+});

@@ -6,15 +6,15 @@ import { t } from "../app/language";
 import { formatRoute, formatStep } from "../app/router";
 import type { Route } from "../app/router";
 import { useStore } from "../app/store";
-import { devicesOf } from "../gateway/devices";
+import { devicesOf, isShared } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { oldness } from "../live/use_feed";
 import { useObject } from "../live/links";
 import { usePulse } from "../live/pulse";
 import { KINDS } from "../panels/panel";
 import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
 import { saveFile } from "../ui/save_file";
+import { Silence } from "../ui/silence";
 import { Definitions, scopeOf } from "../values/definitions";
 import {
   keepBoard,
@@ -67,7 +67,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
   const grid = useRef<HTMLDivElement>(null);
   const [arranging, setArranging] = useState(false);
   const columns = useColumns();
-  const silent = usePulse(object, useShared(list, route.device));
+  const silent = usePulse(object, isShared(useStore(list.state), route.device));
   const services = useServices(list);
   const safe = useSafe(route, list);
   if (!board) {
@@ -120,11 +120,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
         <StopButton object={reach} stop={stop} place={route} safe={safe} />
-        {silent !== null && (
-          <p class="failure board-silent" role="alert">
-            {t("The device has not answered for {0}.", oldness(silent))}
-          </p>
-        )}
+        <Silence silent={silent} />
         <BoardTools
           board={board}
           name={key}
@@ -243,11 +239,6 @@ function useColumns(): number {
     return () => window.removeEventListener("resize", look);
   }, []);
   return columns;
-}
-
-/** Whether all clients share the gateway's connection to the device. */
-function useShared(list: DeviceList, device: string): boolean {
-  return devicesOf(useStore(list.state))?.find(({ name }) => name === device)?.mode === "shared";
 }
 
 /** "device/service" of all that the gateway has. */

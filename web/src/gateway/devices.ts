@@ -92,6 +92,11 @@ export function devicesOf(state: GatewayState): Device[] | null {
   return state.kind === "loading" ? null : state.devices;
 }
 
+/** Whether all clients share the gateway's connection to the device. */
+export function isShared(state: GatewayState, device: string): boolean {
+  return devicesOf(state)?.find(({ name }) => name === device)?.mode === "shared";
+}
+
 async function fetchDevices(signal: AbortSignal): Promise<Device[]> {
   const response = await session.fetch("api/v1/devices", { signal });
   if (!response.ok) throw new Error(`the gateway answered ${response.status} ${response.statusText}`.trim());

@@ -1,9 +1,10 @@
 // A property: its value, read when shown and on request, and a field to set it.
 // Layer: web/members.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Failure } from "../ui/failure";
+import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
 import { RowHead, useAction } from "./row";
@@ -17,7 +18,14 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
   const writing = useAction();
   const [shown, setShown] = useState<string | null>(null);
   const [text, setText] = useState(initialText(member.type));
-  const read = (): void => reading.run(async () => setShown(formatValue(await object.get(member.name))));
+  const readAt = useRef<number | null>(null);
+  const isCurrent = live && reading.failure === null;
+  const age = useAge(() => (isCurrent ? null : readAt.current));
+  const readValue = async (): Promise<void> => {
+    setShown(formatValue(await object.get(member.name)));
+    readAt.current = performance.now();
+  };
+  const read = (): void => reading.run(readValue);
   useEffect(() => {
     if (live && readable) read();
   }, [object, live]);
@@ -25,19 +33,20 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
     event.preventDefault();
     writing.run(async () => {
       await object.set(member.name, parseInput(text, member.type));
-      if (readable) setShown(formatValue(await object.get(member.name)));
+      if (readable) await readValue();
     });
   };
   return (
     <>
       <RowHead member={member} />
       {readable && (
-        <div class="row-line">
+        <div class={`row-line ${age === null ? "" : "is-stale"}`}>
           <output class="value">{shown ?? (reading.busy ? t("reading …") : t("not read"))}</output>
           <button class="button" type="button" disabled={!live || reading.busy} onClick={read}>
             {t("Read")}
             <span class="unseen"> {member.name}</span>
           </button>
+          {age !== null && <p class="note">{t("Stale: {0}", age)}</p>}
         </div>
       )}
       <Failure text={reading.failure} />

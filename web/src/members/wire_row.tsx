@@ -1,23 +1,19 @@
 // A wire: its newest value, how often one comes, and a plot of the numbers in it; and a field to send one.
 // Layer: web/members.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Plot } from "../chart/plot";
-import { Pace } from "../live/pace";
 import { formatRate } from "../live/rate";
-import { explain } from "../robot/remote";
+import { useEach, useFeed } from "../live/use_feed";
 import { Series } from "../robot/series";
 import { Failure } from "../ui/failure";
-import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
 import { readingsOf } from "../values/numeric";
 import { parseInput } from "../values/parse";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
-
-const SHOW_MS = 100;
 
 export function WireRow({ object, member, live }: MemberRowProps) {
   const readable = !member.modifiers.includes("writeonly");
@@ -32,64 +28,28 @@ export function WireRow({ object, member, live }: MemberRowProps) {
 }
 
 function WireReader({ object, name, live }: { object: MemberRowProps["object"]; name: string; live: boolean }) {
-  const pace = useMemo(() => new Pace(), []);
+  const reach = live ? object : null;
   const byLabel = useMemo(() => new Map<string, Series>(), []);
-  const [labels, setLabels] = useState<readonly string[]>([]);
-  const [text, setText] = useState<string | null>(null);
-  const [rate, setRate] = useState(0);
-  const [failure, setFailure] = useState<string | null>(null);
-  const age = useAge(() => pace.heardAt);
-
-  useEffect(() => {
-    if (!live) return;
-    const stop = new AbortController();
-    let newest: unknown;
-    let fresh = false;
-    const follow = async (): Promise<void> => {
-      for await (const value of object.wire(name, stop.signal)) {
-        const now = performance.now();
-        newest = value;
-        fresh = true;
-        pace.hear(now);
-        const readings = readingsOf(value);
-        for (const { label, value: number } of readings) {
-          const series = byLabel.get(label) ?? new Series();
-          byLabel.set(label, series);
-          series.push(now, number);
-        }
-      }
-    };
-    setFailure(null);
-    follow().catch((error: unknown) => {
-      if (!stop.signal.aborted) setFailure(explain(error));
-    });
-    // Values may come a thousand times a second; the text follows ten times.
-    const timer = setInterval(() => {
-      setRate(pace.rate(performance.now()));
-      if (!fresh) return;
-      fresh = false;
-      setText(formatValue(newest));
-      setLabels((old) => (old.length === byLabel.size ? old : [...byLabel.keys()]));
-    }, SHOW_MS);
-    return () => {
-      clearInterval(timer);
-      stop.abort();
-    };
-  }, [object, name, live, pace, byLabel]);
-
-  const lines = useMemo(
-    () => labels.map((label) => byLabel.get(label)).filter((s) => s !== undefined),
-    [labels, byLabel],
-  );
+  const look = useFeed(reach, "wire", name);
+  useEach(reach, "wire", name, (value, now) => {
+    for (const { label, value: number } of readingsOf(value)) {
+      const series = byLabel.get(label) ?? new Series();
+      byLabel.set(label, series);
+      series.push(now, number);
+    }
+  });
+  const lines = useMemo(() => [...byLabel.values()], [byLabel.size, byLabel]);
   return (
     <>
-      <div class={`wire ${age === null ? "" : "is-stale"}`}>
-        <output class="value wire-value">{text ?? (live ? t("no value yet") : t("not connected"))}</output>
+      <div class={`wire ${look.stale === null ? "" : "is-stale"}`}>
+        <output class="value wire-value">
+          {look.value === undefined ? (live ? t("no value yet") : t("not connected")) : formatValue(look.value)}
+        </output>
         {lines.length > 0 && (
           <div class="wire-plot">
             <Plot series={lines} label={t("Plot of {0} over the last 30 seconds", name)} live={live} />
             <ul class="legend">
-              {labels.map((label, i) => (
+              {[...byLabel.keys()].map((label, i) => (
                 <li key={label} class={`legend-${(i % 6) + 1}`}>
                   {label === "" ? name : label}
                 </li>
@@ -99,10 +59,10 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         )}
       </div>
       <p class="note">
-        {rate > 0 ? t("{0} values a second", formatRate(rate)) : t("no regular values")}
-        {age !== null && t("; this one is {0}", age)}
+        {look.rate > 0 ? t("{0} values a second", formatRate(look.rate)) : t("no regular values")}
+        {look.stale !== null && t("; this one is {0}", look.stale)}
       </p>
-      <Failure text={failure} />
+      <Failure text={look.failure} />
     </>
   );
 }

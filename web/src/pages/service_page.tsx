@@ -11,17 +11,19 @@ import { hasPreset, stopFor } from "../board/presets";
 import type { BoardPageProps } from "../board/board_page";
 import { StopButton, useSafe } from "../board/stop";
 import { useStore } from "../app/store";
-import { devicesOf } from "../gateway/devices";
+import { devicesOf, isShared } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import { isUsb } from "../gateway/usb_devices";
 import { useObject, useWalk } from "../live/links";
+import { usePulse } from "../live/pulse";
 import type { Link } from "../robot/link";
 import type { Remote } from "../robot/remote";
 import type { StopCall } from "../robot/stop";
 import { isCreate, isNamedCreate } from "../robot/is_create";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
+import { Silence } from "../ui/silence";
 import { ObjectView } from "./object_view";
 import { ReplayBar } from "./replay_bar";
 import type { RobotPageProps } from "./robot_page";
@@ -63,7 +65,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
         </div>
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
-      {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} />}
+      {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} list={list} />}
       {link && !onlyStop && <ReplayBar link={link} device={device} list={list} />}
       {link && !onlyStop && <Unreached link={link} />}
       {isMissing && (
@@ -213,9 +215,17 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
   return isNamedCreate(known?.type ?? "");
 }
 
-function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; path: readonly PathStep[] }) {
+interface MembersPageProps {
+  link: Link;
+  route: ServiceRoute;
+  path: readonly PathStep[];
+  list: DeviceList;
+}
+
+function MembersPage({ link, route, path, list }: MembersPageProps) {
   const state = useStore(link.state);
   const { object, last, failure } = useWalk(state, path);
+  const silent = usePulse(object, isShared(useStore(list.state), route.device));
   if (failure !== null && state.kind === "online") {
     return (
       <p class="failure" role="alert">
@@ -234,5 +244,10 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
     );
   }
   const key = `${JSON.stringify(path)}:${last.type}`;
-  return <ObjectView key={key} object={last} live={object !== null} route={route} />;
+  return (
+    <>
+      <Silence silent={silent} />
+      <ObjectView key={key} object={last} live={object !== null} route={route} />
+    </>
+  );
 }
