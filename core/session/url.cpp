@@ -118,7 +118,7 @@ Result<void> read_query(std::string_view text, ServiceInUrl rule, ConnectionUrl&
 Result<ConnectionUrl> parse_legacy(std::string_view text, std::string_view rest) {
   const auto slash = rest.find('/');
   if (slash == std::string_view::npos || rest.find('?') != std::string_view::npos)
-    return bad_url(text, "expected tcp://host:port/node/service without a query; newer: rr+tcp://...");
+    return bad_url(text, "expected tcp://host:port/node/service without a query; the current form is rr+tcp://...");
   auto authority = parse_authority(rest.substr(0, slash), text);
   if (!authority) return authority.error();
   const auto port = parse_port(authority->port, 1);
