@@ -42,7 +42,7 @@ mapfile -t worker_files < <(find_files \( -path "$directory/worker/*" -o -name w
 check client "${2:-120}" "${files[@]}"
 check "USB part" "${3:-20}" "${usb_files[@]}"
 check "part for leases" 2 "${lease_files[@]}"
-check "part for services" 144 "${serve_files[@]}"
+check "part for services" 145 "${serve_files[@]}"
 check "part for losses" 1 "${losses_files[@]}"
 check "part for definitions" 2 "${definition_files[@]}"
 check "part that finds services" 1 "${service_files[@]}"
