@@ -53,9 +53,22 @@ Gateway::Gateway(asio::io_context& io, Config config)
 
 Gateway::~Gateway() = default;
 
-rr::Result<Gateway::Listener> Gateway::open(const rr::HostPort& address, std::vector<rr::HostPort>& bound) {
-  Listener out{address, std::make_unique<rr::TcpListener>(io_.get_executor())};
-  const auto opened = out.socket->open(address);
+/// "::" leaves IPv4 to the other addresses of its port: both would be in each other's way.
+std::vector<Gateway::Place> Gateway::places_of(const std::vector<rr::HostPort>& listen) {
+  std::vector<Place> out;
+  for (const auto& address : listen) {
+    const auto has_its_port = [&](const rr::HostPort& other) { return other.port == address.port; };
+    rr::error_code is_name;
+    const auto literal = asio::ip::make_address(address.host, is_name);
+    const bool is_all_of_ipv6 = !is_name && literal.is_v6() && literal.is_unspecified();
+    out.push_back({address, is_all_of_ipv6 && std::count_if(listen.begin(), listen.end(), has_its_port) == 1});
+  }
+  return out;
+}
+
+rr::Result<Gateway::Listener> Gateway::open(const Place& place, std::vector<rr::HostPort>& bound) {
+  Listener out{place, std::make_unique<rr::TcpListener>(io_.get_executor())};
+  const auto opened = out.socket->open(place.address, place.takes_both);
   if (!opened) return opened.error();
   bound.insert(bound.end(), opened->begin(), opened->end());
   return out;
@@ -102,8 +115,8 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
     if (auto adopted = adopt(socket, bound); !adopted) return adopted.error();
   std::vector<Listener> opened;
   if (adopted_.empty())
-    for (const auto& address : config_.listen) {
-      auto listener = open(address, bound);
+    for (const auto& place : places_of(config_.listen)) {
+      auto listener = open(place, bound);
       if (!listener) return listener.error();
       opened.push_back(std::move(*listener));
     }
@@ -207,9 +220,11 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (!devices) return devices.error();
   auto access = load_access(next.access);
   if (!access) return access.error();
-  const auto has = [](const std::vector<rr::HostPort>& addresses, const rr::HostPort& address) {
-    return std::find(addresses.begin(), addresses.end(), address) != addresses.end();
+  const auto has = [](const std::vector<Place>& places, const Place& place) {
+    return std::find(places.begin(), places.end(), place) != places.end();
   };
+  const auto places_before = places_of(config_.listen);
+  const auto places = places_of(next.listen);
   std::vector<Listener> opened;
   std::vector<rr::HostPort> bound;
   for (const auto& acceptor : adopted_) {
@@ -221,29 +236,29 @@ rr::Result<> Gateway::reconfigure(Config next) {
     return rr::make_error(rr::ErrorCode::invalid_configuration, problem);
   bound.clear();
   // Who listens on all addresses of a port is in the way of who wants one of them, and the other way round.
-  std::vector<rr::HostPort> yielded;
+  std::vector<Place> yielded;
   const auto fail = [&](const rr::Error& error) {
     opened.clear();
-    for (const auto& address : yielded)
-      if (auto again = open(address, bound))
+    for (const auto& place : yielded)
+      if (auto again = open(place, bound))
         serve(std::move(*again));
       else
         log(LogLevel::error, "no longer listening", {{"error", again.error().message}});
     return error;
   };
   if (adopted_.empty())
-    for (const auto& address : next.listen) {
-      if (has(config_.listen, address)) continue;
-      auto listener = open(address, bound);
+    for (const auto& place : places) {
+      if (has(places_before, place)) continue;
+      auto listener = open(place, bound);
       if (!listener) {
         std::erase_if(listeners_, [&](const Listener& other) {
-          const bool is_in_the_way = other.address.port == address.port && !has(next.listen, other.address);
+          const bool is_in_the_way = other.place.address.port == place.address.port && !has(places, other.place);
           if (!is_in_the_way) return false;
           other.socket->close();
-          yielded.push_back(other.address);
+          yielded.push_back(other.place);
           return true;
         });
-        if (!yielded.empty()) listener = open(address, bound);
+        if (!yielded.empty()) listener = open(place, bound);
       }
       if (!listener) return fail(listener.error());
       opened.push_back(std::move(*listener));
@@ -254,7 +269,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (before.access.jwt != config_.access.jwt) issuer_keys_.start();
   if (has_other_tls) web_tls_ = std::move(web_tls);
   std::erase_if(listeners_, [&](const Listener& listener) {
-    const bool is_gone = !has(config_.listen, listener.address);
+    const bool is_gone = !has(places, listener.place);
     if (is_gone) listener.socket->close();
     return is_gone;
   });

@@ -44,12 +44,19 @@ class Gateway : public GatewayState {
 
  private:
   using Acceptor = boost::asio::ip::tcp::acceptor;
-  struct Listener {
+  /// What one text of `listen` stands for.
+  struct Place {
     rr::HostPort address;
+    bool takes_both;  ///< "::" is for IPv4 as well
+    bool operator==(const Place&) const = default;
+  };
+  struct Listener {
+    Place place;
     std::unique_ptr<rr::TcpListener> socket;
   };
 
-  rr::Result<Listener> open(const rr::HostPort& address, std::vector<rr::HostPort>& bound);
+  static std::vector<Place> places_of(const std::vector<rr::HostPort>& listen);
+  rr::Result<Listener> open(const Place& place, std::vector<rr::HostPort>& bound);
   void serve(Listener listener);
   rr::Result<> adopt(int socket, std::vector<rr::HostPort>& bound);
   void accept(boost::asio::ip::tcp::socket socket);

@@ -286,6 +286,25 @@ class Serving(Files):
                 return process, int(re.search(r":(\d+)$", event["address"]).group(1))
         self.fail("it ended before it listened")
 
+    def test_all_addresses_are_those_of_ipv4_too(self):
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        both = [f"[::]:{port}", f"0.0.0.0:{port}"]
+        process, _ = self.start(listen=both[:1], insecure=True)
+        for listen in ([], both, both[:1], both[::-1]):
+            if listen:
+                self.file({"listen": listen, "devices": [], "log": {"format": "json"}, "insecure": True})
+                process.send_signal(signal.SIGHUP)
+                for line in process.stderr:
+                    event = json.loads(line)
+                    self.assertNotEqual(event["level"], "error", event)
+                    if event["event"].startswith("configuration"):
+                        break
+            for host in ("127.0.0.1", "::1"):
+                with self.subTest(listen=listen, host=host), socket.create_connection((host, port), timeout=10) as client:
+                    client.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    self.assertTrue(client.recv(4096).startswith(b"HTTP/1.1 200 OK\r\n"))
+
     def test_a_signal_ends_an_idle_gateway(self):
         process, _ = self.start()
         process.send_signal(signal.SIGTERM)
