@@ -1,19 +1,21 @@
 // A phone that is a colour sensor of the room: the mean colour of what its camera sees. Its place is that of the address,
 // phone.html?x=4&y=3, in m from a corner of the room.
 import { serve } from "./rrgate-client/serve/serve.js";
+import { offerSignIn } from "./sign_in.js";
 
 const period = 100; // milliseconds
 const definition = await (await fetch("experimental.conference_room.robdef")).text();
 
 const status = document.querySelector("[role=status]");
-const white = document.querySelector("input");
+const white = document.querySelector("input[name=white]");
 const video = document.querySelector("video");
 const canvas = Object.assign(document.createElement("canvas"), { width: 16, height: 12 });
 const picture = canvas.getContext("2d", { willReadFrequently: true });
 
 white.oninput = () => (white.labels[0].querySelector("output").value = white.value);
 
-document.querySelector("button").onclick = async ({ target: button }) => {
+const button = document.querySelector("button");
+button.onclick = async () => {
   button.disabled = true;
   const given = new URLSearchParams(location.search);
   const place = { x: Number(given.get("x") ?? 4), y: Number(given.get("y") ?? 3) };
@@ -33,6 +35,7 @@ document.querySelector("button").onclick = async ({ target: button }) => {
   } catch (error) {
     status.textContent = `no sensor: ${error.message}`;
     button.disabled = false;
+    await offerSignIn(document.querySelector("form"), () => button.click());
   }
 };
 

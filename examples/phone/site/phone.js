@@ -1,5 +1,6 @@
 // A phone as a Robot Raconteur device: what it feels, sees and is touched by.
 import { serve } from "./rrgate-client/serve/serve.js";
+import { offerSignIn } from "./sign_in.js";
 
 const definition = `
 service example.phone
@@ -24,6 +25,7 @@ object Phone
 end`;
 
 const output = document.querySelector("output");
+const status = document.querySelector("[role=status]");
 const quote = document.querySelector("q");
 const video = document.querySelector("video");
 const canvas = document.createElement("canvas");
@@ -39,7 +41,8 @@ const phone = {
   vibrate: (milliseconds) => navigator.vibrate?.(milliseconds),
 };
 
-document.querySelector("button").onclick = async ({ target: button }) => {
+const button = document.querySelector("button");
+button.onclick = async () => {
   button.disabled = true;
   await DeviceMotionEvent.requestPermission?.(); // of iOS, which asks where a button was pressed
   const name = new URLSearchParams(location.search).get("name") ?? "phone";
@@ -54,10 +57,11 @@ document.querySelector("button").onclick = async ({ target: button }) => {
       onChange: show,
     });
     feel(device);
-    await watch(device);
+    watch(device).catch((error) => (status.textContent = `It has no camera: ${error.message}`));
   } catch (error) {
-    output.textContent = `no device: ${error.message}`;
+    show(false, error.message);
     button.disabled = false;
+    await offerSignIn(document.querySelector("form"), () => button.click());
   }
 };
 

@@ -55,6 +55,7 @@ test.describe("at the wall", () => {
       path.join(example, "experimental.conference_room.robdef"),
       path.join(folder, "site/experimental.conference_room.robdef"),
     );
+    cpSync(path.join(repositoryRoot, "examples/phone/site/sign_in.js"), path.join(folder, "site/sign_in.js"));
     cpSync(path.join(repositoryRoot, "wasm-client/dist"), path.join(folder, "site/rrgate-client"), { recursive: true });
     const port = await freePort();
     url = `http://127.0.0.1:${port}/`;

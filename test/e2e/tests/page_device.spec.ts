@@ -1,9 +1,11 @@
 // The example examples/phone: a page that is a device, with the camera of a browser that has an invented one.
+import { execFileSync } from "node:child_process";
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
 import launch from "../chromium.json" with { type: "json" };
+import { password } from "../guarded_lab";
 import { Program, freePort, repositoryRoot, rrgate } from "../processes";
 
 const camera = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
@@ -80,4 +82,50 @@ test("a page is a device with camera, motion and touch, and no more when it is c
   await page.close();
   await expect.poll(devices).toEqual([]);
   expect(complaints).toEqual([]);
+});
+
+test("a page whose camera is denied is a device without pictures", async ({ page }) => {
+  await page.addInitScript(() => {
+    navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException("denied", "NotAllowedError"));
+  });
+  await page.goto(url);
+  await page.getByRole("button", { name: "Be a device" }).click();
+  await expect(page.getByText("It has no camera: denied")).toBeVisible();
+  await expect(page.locator("output")).toHaveText('device "phone"');
+  await expect(page.getByRole("button")).toBeDisabled();
+  await expect.poll(devices).toMatchObject([{ name: "phone", state: "online" }]);
+  await page.close();
+  await expect.poll(devices).toEqual([]);
+});
+
+test("where the gateway has users, the page asks who one is", async ({ page }) => {
+  const port = await freePort();
+  const users = path.join(folder, "users");
+  execFileSync(rrgate, ["passwd", users, "vera", "--roles", "staff"], { input: `${password}\n` });
+  const config = {
+    listen: [`127.0.0.1:${port}`],
+    devices: [],
+    ["web_root"]: "site",
+    serve: {},
+    access: { ["users_file"]: users, rules: [{ roles: ["staff"], devices: ["phone"], may: ["serve", "read"] }] },
+  };
+  const file = path.join(folder, "guarded.json");
+  writeFileSync(file, JSON.stringify(config));
+  const guarded = new Program(rrgate, ["serve", "--config", file]);
+  guarded.start();
+  try {
+    await guarded.waitForOutput(/listening/);
+    await page.goto(`http://127.0.0.1:${port}/`);
+    await page.getByRole("button", { name: "Be a device" }).click();
+    await page.getByLabel("User").fill("vera");
+    await page.getByLabel("Password").fill("wrong");
+    await page.getByRole("button", { name: "Sign in" }).click();
+    await expect(page.getByRole("alert")).not.toBeEmpty();
+    await page.getByLabel("Password").fill(password);
+    await page.getByRole("button", { name: "Sign in" }).click();
+    await expect(page.locator("output")).toHaveText('device "phone"');
+    await expect(page.locator("form")).toBeHidden();
+  } finally {
+    await guarded.kill("SIGTERM");
+  }
 });
