@@ -76,6 +76,10 @@ def test_what_is_refused(gateway):
     refusal(404, "", "GET", "/parts/99/size")
     refusal(404, "nothing is below it", "GET", "/p_double/x")
     refusal(406, "text/event-stream", "GET", "/changed")
+    for path in ("/changed", "/poses"):
+        assert refusal(405, "GET, HEAD", "POST", path, {}).headers["Allow"] == "GET, HEAD"
+    refusal(406, "text/event-stream", "GET", "/doubled")
+    refusal(501, "only receive", "POST", "/doubled", 1.0)
     refusal(501, "WebSocket", "POST", "/ask", {})
     for accept in ("application/json", "text/event-stream", "multipart/x-mixed-replace"):
         refusal(501, "only be sent to", "GET", "/taken", headers={"Accept": accept})

@@ -243,6 +243,14 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
         response = problem_response(501, "the pipe can only be sent to, which HTTP can't; use a WebSocket");
         break;
       }
+      if (!request.is_read()) {
+        const bool takes_packets =
+            target.member->kind == rr::MemberKind::pipe && target.member->direction() != rr::MemberDirection::readonly;
+        response = takes_packets
+                       ? problem_response(501, "HTTP can only receive from a pipe; use a WebSocket to send to it")
+                       : request.method_response("GET, HEAD");
+        break;
+      }
       response =
           problem_response(406, std::string(target.member->kind == rr::MemberKind::pipe ? "a pipe" : "an event") +
                                     " comes as a stream: ask for it with Accept: text/event-stream");
