@@ -6,6 +6,8 @@ import pytest
 
 from pages import FENCE, ROOT, pages
 
+SOURCES = "cmake|core|docker|docs|examples|gateway-config|include|node|robdef|server|test|wasm-client|web"
+
 
 def anchors(text):
     """Of a page's headings, as GitHub makes them; the site makes them likewise."""
@@ -31,6 +33,22 @@ def leads_somewhere(page, link):
 @pytest.mark.parametrize("page", pages())
 def test_links_lead_somewhere(page):
     assert [link for link in links(pages()[page]) if not leads_somewhere(page, link)] == []
+
+
+def sources(text):
+    """What stands in backticks and begins with a folder of the sources; "<name>" in it is for any."""
+    return re.findall(rf"`((?:{SOURCES})/[\w./<>*-]*)`", FENCE.sub("", text))
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if page != "CHANGELOG.md"])
+def test_named_sources_are_there(page):
+    """The changelog names what was there."""
+    assert [path for path in sources(pages()[page]) if not any(ROOT.glob(re.sub(r"<\w+>", "*", path).rstrip("/")))] == []
+
+
+def test_sources_are_what_a_reader_looks_for():
+    assert sources("`core/a.cpp` `corea/b` [`test/<name>_test.cpp`](x) `docs/`\n```sh\n`core/none`\n```\n") == [
+        "core/a.cpp", "test/<name>_test.cpp", "docs/"]
 
 
 def test_anchors_are_those_of_github():
