@@ -19,8 +19,8 @@ del sys.argv[1:]
 THERMOSTAT = os.path.join(EXAMPLES, "thermostat")
 
 
-def run(*command):
-    result = subprocess.run(command, capture_output=True, text=True, timeout=600)
+def run(*command, **options):
+    result = subprocess.run(command, capture_output=True, text=True, timeout=600, **options)
     if result.returncode != 0:
         raise AssertionError(f"{' '.join(command)}\n{result.stdout}\n{result.stderr}")
     return result.stdout
@@ -29,14 +29,16 @@ def run(*command):
 class Examples(unittest.TestCase):
     def test_a_device_and_a_client_build_and_talk(self):
         with tempfile.TemporaryDirectory() as folder:
-            prefix, build = os.path.join(folder, "installed"), os.path.join(folder, "build")
+            prefix, build = os.path.join(folder, "rrgate"), os.path.join(folder, "build")
             run("cmake", "--install", BUILD, "--prefix", prefix)
             rrgate = os.path.join(prefix, "bin/rrgate")
             self.assertRegex(run(rrgate, "--version"), r"^rrgate \d")
             run(rrgate, "check-config", os.path.join(THERMOSTAT, "gateway.json"))
-            boost = [f"-DBOOST_ROOT={BOOST_ROOT}"] if BOOST_ROOT else []
-            run("cmake", "-S", EXAMPLES, "-B", build, "-G", GENERATOR, f"-DCMAKE_PREFIX_PATH={prefix}",
-                f"-DCMAKE_CXX_COMPILER={CXX}", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror", *boost)
+            configure = as_the_tutorial_says(folder, build)
+            configure()
+            with self.assertRaisesRegex(AssertionError, "libusb-1.0-0-dev"):
+                configure("-DRRGATE_LIBUSB=OFF")
+            configure("-URRGATE_LIBUSB")
             run("cmake", "--build", build)
 
             device = subprocess.Popen([os.path.join(build, "thermostat_device"), "rr+tcp://127.0.0.1:0"],
@@ -129,6 +131,15 @@ class Text(unittest.TestCase):
         names = {os.path.relpath(os.path.join(folder, name), THERMOSTAT)
                  for folder, _, files in os.walk(THERMOSTAT) for name in files if not re.search("/(rrgate-client|node_modules)", folder)}
         self.assertEqual(set(shown), names)
+
+
+def as_the_tutorial_says(home, build):
+    """What configures the examples, in the folder of the sources, where rrgate is installed in `home`."""
+    page = pathlib.Path(EXAMPLES, "../docs/tutorials/cpp-device.md").read_text()
+    (line,) = re.findall(r"^cmake -S .*", page, re.MULTILINE)
+    line = line.replace("build-examples", build) + ' "$@"'
+    ours = ("-G", GENERATOR, f"-DCMAKE_CXX_COMPILER={CXX}", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
+    return lambda *more: run("bash", "-c", line, "bash", *ours, *more, cwd=os.path.dirname(EXAMPLES), env={**os.environ, "HOME": home})
 
 
 def read_json(url):
