@@ -35,7 +35,8 @@ class Block:
 def pages():
     """All pages, by their path in the repository."""
     found = sorted(path for path in (ROOT / "docs").rglob("*.md") if not {"node_modules", ".vitepress"} & set(path.parts))
-    return {str(path.relative_to(ROOT)): path.read_text() for path in [*found, *(ROOT / name for name in OTHERS)]}
+    examples = sorted((ROOT / "examples").glob("*/README.md"))
+    return {str(path.relative_to(ROOT)): path.read_text() for path in [*found, *examples, *(ROOT / name for name in OTHERS)]}
 
 
 @functools.cache

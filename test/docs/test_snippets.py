@@ -15,7 +15,7 @@ from pages import ROOT, blocks, find, unknown
 from processes import BUILD
 
 RRGATE = BUILD / "server" / "rrgate"
-LANGUAGES = {"", "cmake", "cpp", "http", "html", "js", "json", "jsx", "python", "sh", "svelte", "ts", "txt", "vue"}
+LANGUAGES = {"", "cmake", "cpp", "http", "html", "js", "json", "jsx", "matlab", "python", "sh", "svelte", "ts", "txt", "vue"}
 
 
 def of(*languages):
