@@ -42,7 +42,7 @@ test("what a robot could not do is refused, with the waypoint, the joint and the
   expect(() => run({ seconds: 1000, positions: [0, 0] })).toThrow("Waypoint 1 is later than 600 s.");
 });
 
-test("waypoints out of a file or an address are numbers, as many as there are joints", () => {
+test("waypoints out of a file or an address are numbers, at least as many as there are joints", () => {
   const waypoints = [
     { seconds: 1, positions: [1] },
     null,
@@ -51,7 +51,14 @@ test("waypoints out of a file or an address are numbers, as many as there are jo
   ];
   expect(waypointsIn({ waypoints }, 2)).toEqual([
     { seconds: 1, positions: [1, 0] },
-    { seconds: 3, positions: [0, 2] },
+    { seconds: 3, positions: [0, 2, 3] },
   ]);
   expect(waypointsIn({ waypoints: "all" }, 2)).toEqual([]);
+});
+
+test("waypoints keep all of their positions where the joints are not known, and when they are written back", () => {
+  const stored = { waypoints: [{ seconds: 1, positions: [0.5, -1] }] };
+  const back = { waypoints: waypointsIn(stored, 0) };
+  expect(waypointsIn(back, 2)).toEqual([{ seconds: 1, positions: [0.5, -1] }]);
+  expect(waypointsIn(back, 3)).toEqual([{ seconds: 1, positions: [0.5, -1, 0] }]);
 });

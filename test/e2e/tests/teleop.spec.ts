@@ -39,6 +39,13 @@ test.beforeEach(async ({ page, lab }) => {
   await scale.fill("");
   await scale.pressSequentially("-0.5"); // no number yet after the first, and the third
   await expect(scale).toHaveValue("-0.5");
+  await scale.fill("0,5");
+  await scale.blur();
+  await expect(scale).toHaveValue("0.5");
+  await scale.fill("");
+  await scale.pressSequentially("1x");
+  await scale.blur();
+  await expect(scale).toHaveValue("0.5");
   await scale.fill("50");
   await panel.getByLabel("radius at rest").fill("32767");
   await panel.getByLabel("radius at rest").blur();

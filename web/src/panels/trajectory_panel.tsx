@@ -66,6 +66,7 @@ export default function TrajectoryPanel(props: PanelProps) {
   const set = (next: readonly Waypoint[]): void => change({ ...settings, waypoints: next });
   const edit = (at: number, next: Partial<Waypoint>): void =>
     set(waypoints.map((each, i) => (i === at ? { ...each, ...next } : each)));
+  const isKnown = joints.length > 0; // else nobody can see what is changed
   const where = (): number[] => joints.map((_, i) => Number((here.current[i] ?? 0).toFixed(4)));
   const begin = (): void =>
     beginning.run(async () => {
@@ -82,7 +83,7 @@ export default function TrajectoryPanel(props: PanelProps) {
       );
     });
   const isUnderWay = running === "running" || running === "stopping" || beginning.busy;
-  const canBegin = object !== null && isOpen && look.stale === null && look.failure === null && !isUnderWay;
+  const canBegin = object !== null && isKnown && isOpen && look.stale === null && look.failure === null && !isUnderWay;
   return (
     <div class="trajectory-panel">
       <ControlLine control={last} isThere={object !== null} place={place} />
@@ -120,6 +121,7 @@ export default function TrajectoryPanel(props: PanelProps) {
                     label={t("Waypoint {0}: seconds", at + 1)}
                     value={seconds}
                     least={0}
+                    disabled={!isKnown}
                     change={(next) => edit(at, { seconds: next })}
                   />
                 </td>
@@ -136,8 +138,8 @@ export default function TrajectoryPanel(props: PanelProps) {
                   <button
                     class="button button-quiet"
                     type="button"
-                    disabled={positions.length === 0}
-                    onClick={() => edit(at, { positions: where() })}
+                    disabled={!isKnown || positions.length === 0}
+                    onClick={() => edit(at, { positions: [...where(), ...there.slice(joints.length)] })}
                   >
                     {t("Here")}
                     <span class="unseen"> {at + 1}</span>
@@ -145,6 +147,7 @@ export default function TrajectoryPanel(props: PanelProps) {
                   <button
                     class="button button-quiet"
                     type="button"
+                    disabled={!isKnown}
                     onClick={() => set(waypoints.filter((_, i) => i !== at))}
                   >
                     {t("Remove")}

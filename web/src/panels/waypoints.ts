@@ -18,13 +18,15 @@ const SHORTEST_SECONDS = 0.2;
 const LONGEST_SECONDS = 600;
 export const MOST_WAYPOINTS = 100;
 
+/** As stored, whatever is known of the joints at the moment; filled up with 0 to `count`. */
 export function waypointsIn(settings: Settings, count: number): Waypoint[] {
   const found = Object.hasOwn(settings, "waypoints") ? settings["waypoints"] : undefined;
   if (!Array.isArray(found)) return [];
   return found.slice(0, MOST_WAYPOINTS).flatMap((each: unknown) => {
     const { seconds, positions } = (each ?? {}) as Record<string, unknown>;
     if (!isNumber(seconds) || !Array.isArray(positions)) return [];
-    return [{ seconds, positions: Array.from({ length: count }, (_, i) => numberOr0(positions[i])) }];
+    const length = Math.max(count, positions.length);
+    return [{ seconds, positions: Array.from({ length }, (_, i) => numberOr0(positions[i])) }];
   });
 }
 
