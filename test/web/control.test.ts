@@ -1,6 +1,7 @@
 import { Control, stopNow } from "../../web/src/robot/control";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import { Driver } from "../../web/src/robot/driver";
+import { OwnLocks } from "../../web/src/robot/own_locks";
 
 const failed = (code: keyof typeof ErrorCode, message: string) =>
   Object.assign(Object.create(RobotRaconteurError.prototype) as RobotRaconteurError, {
@@ -18,11 +19,13 @@ function setup(answer: () => Promise<unknown> = () => Promise.resolve()) {
     release: vi.fn(() => Promise.resolve()),
   };
   const lease = vi.fn(async () => (await answer(), held));
-  const object = { lease } as never;
+  const locks = new OwnLocks();
+  const object = { lease, locks, path: "Create.arm" } as never;
   return {
     control: new Control(object),
     object,
     lease,
+    locks,
     held,
     lose: (reason: Error) => losers.at(-1)?.(reason),
     tell: (state: string, reason?: Error) => watchers.at(-1)?.(state, reason),
@@ -109,6 +112,19 @@ describe("control", () => {
     expect(lease).toHaveBeenCalledWith({ takeover: true, timeout: 2_000 });
     expect(held.release).toHaveBeenCalledOnce();
     await expect(stopNow(object, true, () => Promise.reject(new Error("away")))).rejects.toThrow("away");
+  });
+  it("is left alone by a stop that a lock of this page keeps out: that is given up, and the stop is sent again", async () => {
+    const { object, lease, locks } = setup();
+    const unlock = vi.fn(() => Promise.resolve());
+    locks.add("Create", unlock);
+    locks.add("Create.ar", () => Promise.reject(new Error("of another object")));
+    const stop = vi.fn(() =>
+      unlock.mock.calls.length > 0 ? Promise.resolve() : Promise.reject(failed("ObjectLockedError", "lost")),
+    );
+    await stopNow(object, false, stop);
+    expect(stop).toHaveBeenCalledTimes(2);
+    expect([...locks.state.value.keys()]).toEqual(["Create.ar"]);
+    expect(lease).not.toHaveBeenCalled();
   });
   it("is taken by a stop where nobody has it and none may be taken over, and else left with whoever has it", async () => {
     const answers = [failed("PermissionDenied", "no takeover"), null];

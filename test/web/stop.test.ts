@@ -1,5 +1,7 @@
 // Stopping: past what waits, behind what it may have overtaken, and never said to have arrived where nothing was sent.
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import { onStop, tellStop, watchStop } from "../../web/src/robot/control";
+import { OwnLocks } from "../../web/src/robot/own_locks";
 import { remoteOf } from "../../web/src/robot/remote";
 import { ROBOT_STOP, stopDevice } from "../../web/src/robot/stop";
 import { UnderWay } from "../../web/src/robot/under_way";
@@ -13,7 +15,7 @@ function makeDevice() {
   const urgent = vi.fn(() => Promise.resolve<unknown>(undefined));
   const setNow = vi.fn(() => Promise.resolve());
   const lease = () => Promise.reject(new Error("none"));
-  return { underWay, urgent, setNow, lease };
+  return { underWay, urgent, setNow, lease, locks: new OwnLocks(), path: "Create" };
 }
 
 describe("a stop", () => {
@@ -51,6 +53,17 @@ describe("a stop", () => {
     await vi.advanceTimersByTimeAsync(0);
     expect(device.urgent).toHaveBeenCalledTimes(2);
     expect(failed).toHaveBeenCalledWith(new Error("refused"));
+  });
+
+  it("arrives where a lock that this page had lost keeps it out: the lock is given up first", async () => {
+    const device = makeDevice();
+    const error = Object.create(RobotRaconteurError.prototype) as RobotRaconteurError;
+    device.urgent.mockRejectedValueOnce(Object.assign(error, { code: ErrorCode.ObjectLockedError, message: "lost" }));
+    const unlock = vi.fn(() => Promise.resolve());
+    device.locks.add("Create", unlock);
+    await stopDevice(device, { call: "halt", args: [] }, () => undefined);
+    expect(unlock).toHaveBeenCalledOnce();
+    expect(device.urgent).toHaveBeenCalledTimes(2);
   });
 
   it("arrives by either of the ways that a standard robot has, and else fails with why", async () => {

@@ -2,43 +2,24 @@
 // Layer: web/panels. Source: sessions spec, object locks.
 
 import { t } from "../app/language";
-import { Store, useStore } from "../app/store";
+import { useStore } from "../app/store";
 import { isUsb } from "../gateway/usb_devices";
 import { endOfLease, nameOfHolder, useHolders } from "../live/holders";
 import type { Holder } from "../live/holders";
 import { useAction } from "../members/row";
-import type { Remote } from "../robot/remote";
+import { OwnLocks } from "../robot/own_locks";
 import { Failure } from "../ui/failure";
 import { clockTime } from "../ui/words";
 import type { PanelProps } from "./panel";
 
-/** When this page has locked the object; null: it has not. */
-type Held = Store<number | null>;
-
-const ofObjects = new WeakMap<Remote, Held>();
-const none: Held = new Store<number | null>(null);
-
-/** The lock belongs to the session, whatever panel shows it, and ends with it. */
-function heldOf(object: Remote): Held {
-  const found = ofObjects.get(object) ?? new Store<number | null>(null);
-  ofObjects.set(object, found);
-  return found;
-}
+const none = new OwnLocks();
 
 export default function LocksPanel({ object, place }: PanelProps) {
-  const lock = object ? heldOf(object) : none;
-  const since = useStore(lock);
+  const held = useStore((object?.locks ?? none).state);
+  const since = held.get(object?.path ?? "")?.since ?? null;
   const asking = useAction();
-  const take = (kind: "user" | "client"): void =>
-    asking.run(async () => {
-      await object?.lock(kind);
-      lock.value = Date.now();
-    });
-  const giveBack = (): void =>
-    asking.run(async () => {
-      await object?.unlock();
-      lock.value = null;
-    });
+  const take = (kind: "user" | "client"): void => asking.run(async () => object?.lock(kind));
+  const giveBack = (): void => asking.run(async () => object?.unlock());
   const off = !object || asking.busy;
   return (
     <div class="locks-panel">

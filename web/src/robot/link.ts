@@ -5,6 +5,7 @@ import { subscribe } from "rrgate-client";
 import type { RemoteObject, UrlSource } from "rrgate-client";
 import { Store } from "../app/store";
 import type { Control } from "./control";
+import { OwnLocks } from "./own_locks";
 import { explain, remoteOf } from "./remote";
 import type { Remote } from "./remote";
 
@@ -28,6 +29,7 @@ export class Link {
   readonly state = new Store<LinkState>({ kind: "connecting" });
   readonly #subscription;
   readonly #controls = new Map<string, Control>();
+  #locks = new OwnLocks();
   #client: RemoteObject | null = null;
 
   /** Starts connecting at once. `follow`: for tests. */
@@ -35,6 +37,7 @@ export class Link {
     this.#subscription = follow(url, LIMITS);
     this.#subscription.onConnected((client) => {
       this.#client = client;
+      this.#locks = new OwnLocks(); // those from before ended with their session
       this.#connect(client);
     });
     this.#subscription.onLost((reason) => this.#lose(explain(reason), null));
@@ -64,7 +67,7 @@ export class Link {
 
   /** Anew for those who look: what they had asked the device for is gone. */
   #connect(client: RemoteObject): void {
-    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client, this.#controls) };
+    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client, this.#controls, this.#locks) };
   }
 
   /** Rights to command are lost before anybody hears of it: who had them takes them again by hand. */

@@ -14,6 +14,7 @@ import type {
 } from "rrgate-client";
 
 import type { Control } from "./control";
+import { OwnLocks } from "./own_locks";
 import { UnderWay } from "./under_way";
 
 export type Member = MemberInfo;
@@ -32,6 +33,8 @@ export interface Remote {
   readonly underWay: UnderWay;
   /** By path, the newest of each object of the service: they outlive the connection. */
   readonly controls: Map<string, Control>;
+  /** Of all objects of the session. */
+  readonly locks: OwnLocks;
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   /** Past whatever waits to be sent. @throws (rejects) where `name` is no function, or one that only begins a generator. */
@@ -91,6 +94,7 @@ export function isGenerator({ type, parameters }: Pick<Member, "type" | "paramet
 export function remoteOf(
   object: RemoteObject,
   controls = new Map<string, Control>(),
+  locks = new OwnLocks(),
   underWay = new UnderWay(),
 ): Remote {
   const info = object.$;
@@ -110,6 +114,7 @@ export function remoteOf(
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     underWay,
     controls,
+    locks,
     call: (name, args, options) =>
       underWay.follow((async () => member(name)(...args, ...(options ? [options] : [])))()),
     urgent: async (name, args, options) => {
@@ -137,8 +142,14 @@ export function remoteOf(
       return endpoint;
     },
     generate: (name, args) => member(name)(...args),
-    lock: async (kind) => info.lock(kind),
-    unlock: async () => info.unlock(),
+    lock: async (kind) => {
+      await info.lock(kind);
+      locks.add(info.path, () => info.unlock());
+    },
+    unlock: async () => {
+      await info.unlock();
+      locks.delete(info.path);
+    },
     ping: async (timeout) => {
       const small = smallest(info.members);
       if (small?.kind === "wire") await member(small.name).peek({ timeout });
@@ -155,7 +166,7 @@ export function remoteOf(
     onReleased: (released) => info.onClose(() => info.state === "released" && released()),
     child: async (name, index) => {
       const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
-      const child = children.get(found) ?? remoteOf(found, controls, underWay);
+      const child = children.get(found) ?? remoteOf(found, controls, locks, underWay);
       children.set(found, child);
       return child;
     },

@@ -14,7 +14,7 @@ export interface StopCall {
 /** Of `com.robotraconteur.robotics.robot.Robot`. */
 export const ROBOT_STOP: StopCall = { call: "halt", args: [], set: { property: "command_mode", value: 0 } };
 
-type Device = Pick<Remote, "lease" | "urgent" | "setNow" | "underWay">;
+type Device = Pick<Remote, "lease" | "locks" | "path" | "urgent" | "setNow" | "underWay">;
 
 const TIMEOUT_MS = 2_000;
 const REPEAT_MS = 400;
@@ -36,9 +36,11 @@ export async function stopDevice(device: Device, stop: StopCall, failed: (error:
 
 /** Nothing is waited for: a call that hangs does not hold this one up. */
 function send(device: Device, stop: StopCall, insists: boolean): Promise<void> {
-  const ways = [device.urgent(stop.call, stop.args, { timeout: TIMEOUT_MS })];
-  if (stop.set) ways.push(device.setNow(stop.set.property, stop.set.value, { timeout: TIMEOUT_MS }));
-  return stopNow(device, insists, () => firstToArrive(ways));
+  return stopNow(device, insists, () => {
+    const ways = [device.urgent(stop.call, stop.args, { timeout: TIMEOUT_MS })];
+    if (stop.set) ways.push(device.setNow(stop.set.property, stop.set.value, { timeout: TIMEOUT_MS }));
+    return firstToArrive(ways);
+  });
 }
 
 async function sendBehind(device: Device, stop: StopCall, overtaken: Promise<unknown>, first: Promise<void>) {
