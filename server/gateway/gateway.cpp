@@ -287,7 +287,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
     found_ = std::make_unique<FoundDevices>(io_, config_, devices_, std::move(found_tls));
     found_->start();
   }
-  if (before.recordings != config_.recordings) recordings_->follow_config();
+  recordings_->follow_config();
   router_ = make_routes(*this);
   // Clients of a found device that is gone stay as long as it lets them, unless a configured one has its name.
   const auto is_still_there = [this](const Device& device) {

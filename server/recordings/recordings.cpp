@@ -111,7 +111,10 @@ void Recordings::follow_config() {
   for (auto& [name, run] : runs_) {
     if (!run->writer) continue;
     const bool is_wanted = std::find(wishes.begin(), wishes.end(), run->wish) != wishes.end();
-    if (run->folder != config_.recordings.folder || (run->info.is_standing && !is_wanted)) end_run(*run, std::nullopt);
+    if (run->folder != config_.recordings.folder || (run->info.is_standing && !is_wanted))
+      end_run(*run, std::nullopt);
+    else if (auto why = why_device_is_gone(*run))
+      end_run(*run, std::move(why));
   }
   next_standing_ = steady_clock::now();
   timer_.cancel();
@@ -367,9 +370,14 @@ std::optional<rr::Error> Recordings::end_of(const Run& run, const Folder& folder
                                 " that " + std::to_string(clients) +
                                 " recordings of clients share: the others need the rest");
   }
-  if (!devices_.has(run.recorder->device()))
-    return rr::make_error(rr::ErrorCode::resource_not_found, "the device has left the gateway");
-  return std::nullopt;
+  return why_device_is_gone(run);
+}
+
+std::optional<rr::Error> Recordings::why_device_is_gone(const Run& run) const {
+  if (devices_.has(run.recorder->device())) return std::nullopt;
+  const bool is_changed = devices_.find(run.info.device) != nullptr;
+  return rr::make_error(rr::ErrorCode::resource_not_found,
+                        is_changed ? "the device was changed in the configuration" : "the device has left the gateway");
 }
 
 /// What waits for its chunk reaches the file, so that a gateway that is killed loses a second at most.

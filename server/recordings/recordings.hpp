@@ -58,7 +58,7 @@ class Recordings {
              ValueClients& clients, Workers& workers);
   ~Recordings();
 
-  /// Begins what the configuration wants, soon; again when that has changed.
+  /// Begins what the configuration wants, soon; again when that, or a device, has changed.
   void follow_config();
   /// Completes all files.
   void stop();
@@ -98,6 +98,7 @@ class Recordings {
   void tick(Folder& folder);
   /// Why a recording has to end; nullopt: it goes on. `room`  see room_for_clients().
   std::optional<rr::Error> end_of(const Run& run, const Folder& folder, std::uint64_t room) const;
+  std::optional<rr::Error> why_device_is_gone(const Run& run) const;
   /// What all files may take as far as clients are concerned: the configuration's recordings have room of their own.
   std::uint64_t room_for_clients(const Folder& folder) const;
   std::size_t count_of_clients() const;

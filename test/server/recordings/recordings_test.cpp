@@ -127,6 +127,22 @@ TEST_CASE("recordings: a ring keeps its files while the gateway is started again
   CHECK(made.has(former[1]));
 }
 
+TEST_CASE("recordings: what the configuration wants goes on at once where it says that the device is elsewhere") {
+  RecordedArm made;
+  made.config.recordings.standing = {RecordedArm::wish()};
+  made.recordings.follow_config();
+  const auto before = made.standing().name;
+  const auto clients = made.wait_for(made.recordings.begin(RecordedArm::wish())).value();
+  auto next = made.config;
+  next.devices.at(0).url = rr::parse_url("rr+tcp://127.0.0.1:2/?service=Arm").value();
+  auto devices = made.devices.prepare(next).value();
+  made.config = next;
+  made.devices.replace(std::move(devices));
+  made.recordings.follow_config();
+  CHECK(made.standing().name != before);  // standing_period, after which it is begun anyway, is longer than that waits
+  CHECK(made.look(clients).problem == "the device was changed in the configuration");
+}
+
 TEST_CASE("recordings: a ring makes room where the folder is full") {
   RecordedArm made;
   for (const auto& name : former) made.fill(made.ring_file(name), 300'000);
