@@ -52,3 +52,26 @@ test("a pipe panel of an object without pipes says so", async ({ page, lab }) =>
   await addPanel(page, "pipe");
   await expect(page.locator('[data-panel="pipe"]')).toContainText("This object has no pipes.", { timeout: 5_000 });
 });
+
+test("a picture from before an outage stays marked as old until the camera has sent another one", async ({
+  page,
+  lab,
+}) => {
+  await openBoard(page, lab.url, "webcams/Webcam/Webcams%5B0%5D");
+  const panel = page.locator('[data-panel="image"]').first();
+  const box = panel.locator(".image-box");
+  await panel.getByRole("button", { name: "Start stream" }).click();
+  await expect(panel.locator(".freshness")).toContainText("a second");
+  await expect(box).not.toHaveClass(/is-stale/);
+  await lab.webcams.kill();
+  await expect(box).toHaveClass(/is-stale/);
+  lab.webcams.start();
+  await lab.waitUntilOnline();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  const again = panel.getByRole("button", { name: "Start stream" });
+  await expect(again).toBeEnabled(); // the camera streams only when it is told to again
+  await expect(panel.locator(".freshness")).toHaveText(/^Stale: /);
+  await expect(box).toHaveClass(/is-stale/);
+  await again.click();
+  await expect(box).not.toHaveClass(/is-stale/);
+});

@@ -4,7 +4,9 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { drawFrame } from "../camera/draw_frame";
-import { useFeed } from "../live/use_feed";
+import { useNow } from "../app/store";
+import type { Feed } from "../live/feed";
+import { lookAt, useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
@@ -14,6 +16,14 @@ import { feedKindOf, Freshness, MemberSelect } from "./parts";
 import "./image_panel.css";
 
 const EMPTY = [4, 3] as const;
+
+interface Shown {
+  size: string;
+  failure: string | null;
+  /** Where the picture came by; null: by a call, or there is none. */
+  from: Feed | null;
+}
+const NOTHING: Shown = { size: "", failure: null, from: null };
 
 export default function ImagePanel({ object, members, place, settings, change }: PanelProps) {
   const choices = useMemo(() => membersFor("image", members), [members]);
@@ -25,24 +35,25 @@ export default function ImagePanel({ object, members, place, settings, change }:
   const kind = member?.kind === "function" ? null : feedKindOf(member);
   const canvas = useRef<HTMLCanvasElement>(null);
   const look = useFeed(object, kind, name);
-  const [shown, setShown] = useState<{ size: string; failure: string | null }>({ size: "", failure: null });
+  const [shown, setShown] = useState<Shown>(NOTHING);
   const acting = useAction();
   const source = [place.device, place.service, place.object, name].join("/");
   // Each source has a canvas of its own: what comes late from another one is drawn where nobody sees it.
-  const draw = async (value: unknown, on: HTMLCanvasElement | null): Promise<void> => {
-    const show = (next: { size?: string; failure: string | null }): void => {
+  const draw = async (value: unknown, on: HTMLCanvasElement | null, from: Feed | null): Promise<void> => {
+    const show = (next: Partial<Shown>): void => {
       if (canvas.current !== on) return;
-      setShown((old) =>
-        old.failure === next.failure && old.size === (next.size ?? old.size) ? old : { ...old, ...next },
-      );
+      setShown((old) => {
+        const now = { ...old, ...next };
+        return old.failure === now.failure && old.size === now.size && old.from === now.from ? old : now;
+      });
     };
     try {
-      show({ size: await drawFrame(on, value), failure: null });
+      show({ size: await drawFrame(on, value), failure: null, from });
     } catch (error) {
       show({ failure: explain(error) });
     }
   };
-  useEffect(() => setShown({ size: "", failure: null }), [source]);
+  useEffect(() => setShown(NOTHING), [source]);
   const feed = look.feed;
   useEffect(() => {
     if (!feed || feed.kind !== kind || feed.member !== name) return;
@@ -54,7 +65,7 @@ export default function ImagePanel({ object, members, place, settings, change }:
       if (isDrawing || feed.newest === undefined || feed.newest === drawn) return;
       drawn = feed.newest;
       isDrawing = true;
-      void draw(drawn, canvas.current).finally(() => (isDrawing = false));
+      void draw(drawn, canvas.current, feed).finally(() => (isDrawing = false));
     };
     next();
     return () => cancelAnimationFrame(frame);
@@ -62,7 +73,7 @@ export default function ImagePanel({ object, members, place, settings, change }:
   const take = (): void =>
     acting.run(async () => {
       const on = canvas.current;
-      await draw(await object?.call(name, []), on);
+      await draw(await object?.call(name, []), on, null);
     });
   const begin = (): void => acting.run(async () => void (start && (await object?.call(start, []))));
   const save = (): void =>
@@ -74,6 +85,10 @@ export default function ImagePanel({ object, members, place, settings, change }:
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
     });
+  useNow(1_000); // the picture ages
+  // Of a connection that was lost: old until the one that there is now has sent one.
+  const isOfBefore = shown.from !== null && shown.from !== feed;
+  const seen = isOfBefore ? { ...lookAt(shown.from as Feed, false, performance.now()), failure: look.failure } : look;
   const streams = look.rate > 0; // regularly: one picture alone does not say so
   const starter = kind === "pipe" && start && !streams && (
     <button
@@ -99,7 +114,7 @@ export default function ImagePanel({ object, members, place, settings, change }:
         </button>
         {shown.size !== "" && starter}
       </div>
-      <div class={`image-box ${look.stale === null ? "" : "is-stale"}`}>
+      <div class={`image-box ${isOfBefore || look.stale !== null ? "is-stale" : ""}`}>
         <canvas
           key={source}
           ref={canvas}
@@ -112,7 +127,7 @@ export default function ImagePanel({ object, members, place, settings, change }:
       </div>
       <Failure text={shown.failure ?? acting.failure} />
       <div class="panel-foot">
-        {kind !== null && <Freshness look={look} isLive={object !== null} />}
+        {kind !== null && <Freshness look={seen} isLive={object !== null && !isOfBefore} />}
         <span class="note">{shown.size}</span>
       </div>
     </div>
