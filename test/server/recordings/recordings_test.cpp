@@ -132,7 +132,9 @@ TEST_CASE("recordings: what the configuration wants goes on at once where it say
   made.config.recordings.standing = {RecordedArm::wish()};
   made.recordings.follow_config();
   const auto before = made.standing().name;
-  const auto clients = made.wait_for(made.recordings.begin(RecordedArm::wish())).value();
+  auto other = RecordedArm::wish();
+  other.members = {"joints"};
+  const auto clients = made.wait_for(made.recordings.begin(other)).value();
   auto next = made.config;
   next.devices.at(0).url = rr::parse_url("rr+tcp://127.0.0.1:2/?service=Arm").value();
   auto devices = made.devices.prepare(next).value();
