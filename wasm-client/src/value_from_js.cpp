@@ -148,8 +148,7 @@ bool FromJs::read_enum(const FieldPath& path, const JsValue& js, const TypeDefin
 bool FromJs::read_text(const FieldPath& path, const JsValue& js, std::string& out) {
   if (js.kind() != JsKind::text) return fail_mismatch(path, js, "a string");
   auto text = js.text();
-  if (!text)
-    return fail(ErrorCode::data_type_error, path, "holds a surrogate without its other half");
+  if (!text) return fail(ErrorCode::data_type_error, path, "holds a surrogate without its other half");
   out = std::move(*text);
   return true;
 }
