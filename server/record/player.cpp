@@ -55,8 +55,7 @@ void Player::seek(double position) {
 void Player::step(std::uint32_t messages) {
   is_playing_ = false;
   timer_.cancel();
-  for (std::uint32_t i = 0; i < std::min(messages, max_step) && next_message();)
-    if (deliver_next()) ++i;
+  for (std::uint32_t i = 0; i < std::min(messages, max_step) && next_message(); ++i) deliver_next();
   listener_.changed();
 }
 
@@ -138,13 +137,10 @@ void Player::fail(const rr::Error& error) {
   listener_.failed(error);
 }
 
-bool Player::deliver_next() {
-  const auto at = message_++;
-  const auto& message = messages_.messages[at];
+void Player::deliver_next() {
+  const auto& message = messages_.messages[message_++];
   position_ = std::max(position_, message.log_time);
-  if (chunk_ == restored_chunk_ && at < restored_message_ && has_state(message.channel)) return false;
   deliver(message);
-  return true;
 }
 
 /// The first value of a wire after the replay went back may have been sent long before it was recorded, or before the
@@ -182,14 +178,10 @@ bool Player::has_state(std::uint16_t channel) const {
   return kind == rr::MemberKind::wire || kind == rr::MemberKind::property;
 }
 
-/// Hands out the value that each wire and property has now. Events and packets of this very moment come when the replay
-/// goes on.
+/// Hands out the newest value before the next message of each wire and property.
 void Player::restore() {
   const auto chunk = chunk_;
-  auto end = message_;
-  while (end < messages_.messages.size() && messages_.messages[end].log_time <= position_) ++end;
-  restored_chunk_ = chunk;
-  restored_message_ = end;
+  const auto end = message_;
   std::set<std::uint16_t> found;
   for (auto i = chunk + 1; i-- > 0;) {
     const auto& counts = recording_.chunks()[i].message_counts;
@@ -200,29 +192,6 @@ void Player::restore() {
       const auto& message = messages_.messages[at];
       if (has_state(message.channel) && found.insert(message.channel).second) deliver(message);
     }
-  }
-  restore_before_first(found);
-}
-
-/// Those of which nothing is known yet. What they had later on is not what they have now: properties have none, and
-/// wires, which can't be without one any more, the first that is known.
-void Player::restore_before_first(const std::set<std::uint16_t>& found) {
-  std::set<std::uint16_t> wires;
-  for (std::size_t i = 0; i < recording_.members().size(); ++i) {
-    const auto channel = static_cast<std::uint16_t>(i);
-    if (!has_state(channel) || found.contains(channel) || !newest_.contains(channel)) continue;
-    if (recording_.members().at(channel).kind == rr::MemberKind::wire)
-      wires.insert(channel);
-    else
-      listener_.forget(channel);
-  }
-  for (auto i = chunk_; i < recording_.chunks().size() && !wires.empty(); ++i) {
-    const auto& counts = recording_.chunks()[i].message_counts;
-    if (std::none_of(counts.begin(), counts.end(), [&](const auto& each) { return wires.contains(each.first); }))
-      continue;
-    if (!load(i)) return;
-    for (const auto& message : messages_.messages)
-      if (wires.erase(message.channel) != 0) deliver(message);
   }
 }
 

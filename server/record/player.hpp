@@ -31,8 +31,6 @@ class Player {
   struct Listener {
     /// `shift`  what is to be added to time stamps, in ns: they go on where the recording went back.
     std::function<void(const McapMessage&, McapTime shift)> play;
-    /// The replay went back to before the first value of a property.
-    std::function<void(std::uint16_t channel)> forget;
     /// The player was started, stopped, moved or set; and ten times a second while it plays.
     std::function<void()> changed;
     /// The file can't be read any more: it is paused.
@@ -59,15 +57,13 @@ class Player {
   /// null: behind the last one.
   const McapMessage* next_message();
   bool load(std::size_t chunk);
-  /// Returns whether it was handed out now, and not already when the replay went there.
-  bool deliver_next();
+  void deliver_next();
   void deliver(const McapMessage& message);
   void turn();
   void wait(Clock::duration time);
   void rebase();
   void go_to(McapTime time);
   void restore();
-  void restore_before_first(const std::set<std::uint16_t>& found);
   bool has_state(std::uint16_t channel) const;
   void fail(const rr::Error& error);
 
@@ -80,8 +76,6 @@ class Player {
   double speed_ = 1;
   McapTime position_;
   McapTime shift_ = 0;
-  std::size_t restored_chunk_ = 0;  ///< wires and properties before that message have been handed out
-  std::size_t restored_message_ = 0;
   std::map<std::uint16_t, McapTime> newest_;  ///< time stamp of each channel that was handed out, shift_ included
   std::map<std::uint16_t, McapTime> floors_;  ///< the same when the replay last went back
   Clock::time_point base_;                    ///< when base_position_ was

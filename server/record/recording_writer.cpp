@@ -169,10 +169,7 @@ rr::Result<> RecordingWriter::add_service(const RecordedService& service) {
     *known = texts;
   else
     services_.push_back(texts);
-  const auto before = writer_.size();
-  auto added = writer_.add_metadata(recorded_service_name, texts);
-  preamble_ += writer_.size() - before;
-  return added;
+  return writer_.add_metadata(recorded_service_name, texts);
 }
 
 rr::Result<std::uint16_t> RecordingWriter::add_member(const RecordedService& service, const std::string& object_path,
@@ -189,9 +186,7 @@ rr::Result<std::uint16_t> RecordingWriter::add_member(const RecordedService& ser
                       {"member", member.name},
                       {"kind", std::string(rr::member_kind_name(member.kind))}};
   if (member.kind != rr::MemberKind::event) channel.metadata["type"] = rr::format_type(member.type);
-  const auto before = writer_.size();
   if (auto put = put_channel(channel); !put) return put.error();
-  preamble_ += writer_.size() - before;
   topics_.push_back(channel.topic);
   channels_.push_back(std::move(channel));
   return static_cast<std::uint16_t>(channels_.size() - 1);
@@ -211,8 +206,7 @@ rr::Result<> RecordingWriter::put_channel(const Channel& channel) {
 
 rr::Result<> RecordingWriter::write(std::uint16_t channel, const rr::OrderedJson& message,
                                     std::optional<rr::TimeSpec> sent, rr::TimeSpec now) {
-  const auto size = writer_.size();
-  const bool is_full = options_.max_bytes != 0 && size >= options_.max_bytes && size - preamble_ >= preamble_;
+  const bool is_full = options_.max_bytes != 0 && writer_.size() >= options_.max_bytes;
   if (is_full || writer_.index_bytes() >= options_.max_index_bytes)
     if (auto begun = begin_next_file(); !begun) return begun;
   const auto text = rr::write_json(message);
@@ -263,7 +257,6 @@ rr::Result<> RecordingWriter::begin_next_file() {
     if (auto added = writer_.add_metadata(recorded_service_name, service); !added) return added;
   for (const auto& channel : channels_)
     if (auto put = put_channel(channel); !put) return put;
-  preamble_ = writer_.size();
   return {};
 }
 

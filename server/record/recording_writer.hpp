@@ -39,9 +39,7 @@ struct RecordedService {
 };
 
 struct RecordingOptions {
-  /// Of one file, about; then the next one begins. 0: no limit. A file has at least as many bytes of messages as of
-  /// what comes before them, however low the limit.
-  std::uint64_t max_bytes = 0;
+  std::uint64_t max_bytes = 0;  ///< of one file, about; then the next one begins. 0: no limit
   /// The oldest go before a further one begins. 0: all stay.
   std::uint32_t kept_files = 0;
   std::deque<std::string> former = {};  ///< paths of older files that count among the kept ones, oldest first
@@ -118,7 +116,6 @@ class RecordingWriter {
   McapTime shift_ = 0;  ///< of the clock, which was set back
   std::uint64_t finished_messages_ = 0;
   std::uint64_t finished_bytes_ = 0;
-  std::uint64_t preamble_ = 0;  ///< bytes of services and channels in the file
 };
 
 /// The schema of a member's messages, without references and choices, as tools read it that plot numbers. Text and

@@ -10,8 +10,6 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::string_view control_type = "org.rrgate.replay.Replay";
-
 rr::TimeSpec to_time_spec(McapTime time) {
   constexpr McapTime second = 1'000'000'000u;
   return {static_cast<std::int64_t>(time / second), static_cast<std::int32_t>(time % second)};
@@ -49,22 +47,13 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
     : io_(io),
       options_(std::move(options)),
       player_(io, std::move(recording),
-              {[this](const McapMessage& message, McapTime shift) { play(message, shift); },
-               [this](std::uint16_t channel) {
-                 if (auto* service = service_of(channel)) service->forget(channel);
-               },
-               [this] { tell_state(); }, [this](const rr::Error& error) { report(error.message); }}) {
+              {[this](const McapMessage& message, McapTime shift) { play(message, shift); }, [this] { tell_state(); },
+               [this](const rr::Error& error) { report(error.message); }}) {
   for (const auto& recorded : player_.recording().services()) {
-    if (recorded.type == control_type) {  // it controlled a replay then, and can't control this one
-      report(player_.recording().path() + ": service " + rr::quote(recorded.service) +
-             " controlled the replay that was recorded; it is left out");
-      continue;
-    }
     auto service = ReplayedService::make(player_.recording(), recorded);
     if (!service) throw std::invalid_argument(service.error().message);
     auto& node = node_of(recorded);
     node.node->add(service->service());
-    node.services.insert(recorded.service);
     urls_.push_back(node.address + "/?service=" + rr::percent_encode(recorded.service));
     services_.push_back(std::move(*service));
   }
@@ -72,16 +61,11 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
 }
 
 Replay::Node& Replay::node_of(const RecordedService& recorded) {
-  // A node has one service of a name; a further one that was recorded stands alone.
-  const auto is_its = [&recorded](const Node& node) {
-    return node.recorded == recorded.node && !node.services.contains(recorded.service);
-  };
+  const auto is_its = [&recorded](const Node& node) { return node.recorded == recorded.node; };
   if (const auto found = std::find_if(nodes_.begin(), nodes_.end(), is_its); found != nodes_.end()) return *found;
   const auto address = address_of(options_.listen, nodes_.size());
   rr::NodeOptions how;
-  const bool is_first = std::none_of(nodes_.begin(), nodes_.end(),
-                                     [&recorded](const Node& node) { return node.recorded == recorded.node; });
-  if (options_.keeps_ids && is_first) how.id = recorded.node.id;
+  if (options_.keeps_ids) how.id = recorded.node.id;
   how.report = [this](const std::string& problem) { report(problem); };
   auto node = std::make_unique<rr::Node>(io_, recorded.node.name, how);
   add_control(*node);
@@ -130,16 +114,9 @@ void Replay::tell_state() {
   for (const auto& control : controls_) control->set_wire("state", value);
 }
 
-/// Null: of a service that is left out.
-ReplayedService* Replay::service_of(std::uint16_t channel) {
-  const auto found = std::find_if(services_.begin(), services_.end(),
-                                  [channel](const ReplayedService& each) { return each.has(channel); });
-  return found == services_.end() ? nullptr : &*found;
-}
-
 void Replay::play(const McapMessage& message, McapTime shift) {
-  auto* service = service_of(message.channel);
-  if (!service) return;
+  const auto service = std::find_if(services_.begin(), services_.end(),
+                                    [&message](const ReplayedService& each) { return each.has(message.channel); });
   const auto document = player_.recording().read_document(message);
   const auto played = document ? service->play(message.channel, *document, to_time_spec(message.publish_time + shift))
                                : rr::Result<>(document.error());

@@ -43,11 +43,9 @@ class Replay {
   struct Node {
     rr::NodeIdentity recorded;
     std::unique_ptr<rr::Node> node;
-    std::string address;                  ///< "rr+tcp://127.0.0.1:52222"
-    std::set<std::string> services = {};  ///< by the names that they were recorded with
+    std::string address;  ///< "rr+tcp://127.0.0.1:52222"
   };
   Node& node_of(const RecordedService& recorded);
-  ReplayedService* service_of(std::uint16_t channel);
   void add_control(rr::Node& node);
   void play(const McapMessage& message, McapTime shift);
   void tell_state();

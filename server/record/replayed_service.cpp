@@ -92,10 +92,6 @@ void ReplayedService::add_member(const RecordedMember& member) {
   members_.emplace(member.channel, std::move(out));
 }
 
-void ReplayedService::forget(std::uint16_t channel) {
-  members_.at(channel).property->reset();
-}
-
 rr::Result<> ReplayedService::play(std::uint16_t channel, const rr::Json& document, rr::TimeSpec sent) {
   const auto& member = members_.at(channel);
   const auto& definition = *member.definition;

@@ -23,8 +23,6 @@ class ReplayedService {
   /// `channel`  one that it has. `sent`  the time of wires.
   /// Errors   those of value_from_json().
   rr::Result<> play(std::uint16_t channel, const rr::Json& document, rr::TimeSpec sent);
-  /// A property that it has is without a value again.
-  void forget(std::uint16_t channel);
 
  private:
   struct Member {

@@ -128,25 +128,6 @@ TEST_CASE("a file that is large enough is followed by the next, which stands for
   CHECK(files == 2);
 }
 
-TEST_CASE("a file has more than what its messages need to be read, however small files are to be") {
-  const test::Folder folder;
-  Recorded robot;
-  RecordingOptions options;
-  options.max_bytes = 100;
-  options.kept_files = 2;
-  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
-  const auto pose = robot.add(writer, "pose");
-  for (int i = 0; i < 1000; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
-  REQUIRE(writer.close());
-  std::size_t kept = 0;
-  for (const auto& each : std::filesystem::directory_iterator(std::filesystem::path(writer.path()).parent_path()))
-    kept += Recording::open(each.path().string()).value().message_count();
-  CHECK(kept > 20);
-  CHECK(std::filesystem::file_size(writer.path()) < 20'000);
-}
-
 TEST_CASE("the files that follow leave those of an earlier recording alone, unless they are to be replaced") {
   const test::Folder folder;
   const auto earlier = folder.path("a-2.mcap");
