@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 
+#include "core/support/whole_number.hpp"
 #include "core/support/words.hpp"
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
@@ -41,10 +41,9 @@ std::vector<EndedSignIn> read_ended_sign_ins(const std::string& file, EndedSignI
     const auto end = std::min(text.find('\n'), text.size());
     const auto fields = rr::split_words(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
-    std::int64_t ends = 0;
-    if (fields.size() == 3) std::from_chars(fields[1].data(), fields[1].data() + fields[1].size(), ends);
-    if (ends <= in_milliseconds(now)) continue;
-    const std::chrono::milliseconds at(std::min(ends, in_milliseconds(EndedSignIn::Time::max())));
+    const auto ends = fields.size() == 3 ? rr::whole_number<std::int64_t>(fields[1]) : std::nullopt;
+    if (!ends || *ends <= in_milliseconds(now)) continue;
+    const std::chrono::milliseconds at(std::min(*ends, in_milliseconds(EndedSignIn::Time::max())));
     out.push_back({std::string(fields[0]), std::string(fields[2]), EndedSignIn::Time(at)});
   }
   return out;

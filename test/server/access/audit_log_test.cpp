@@ -232,6 +232,13 @@ TEST_CASE("records that were edited, cut out, put elsewhere or cut off are found
     return findings.size();
   };
   CHECK(findings_of({folder.file()}).empty());
+  const auto check_without_head = [&] {
+    fs::remove(folder.file("audit.head"));
+    CHECK(check(0, "audit.head: the end may have been cut off", "which names the last record") == 1);
+    write_log({.file = folder.file()}, 1);
+    CHECK(read(folder.file()).find("audit.head is missing: the end of the file may have been cut off") !=
+          std::string::npos);
+  };
   SECTION("edited") {
     lines[3].replace(lines[3].find("alice"), 5, "bob");
     CHECK(check(4, "record 4 with hash", "by its text and the record before") == 1);
@@ -274,20 +281,12 @@ TEST_CASE("records that were edited, cut out, put elsewhere or cut off are found
   SECTION("cut off at the end, and what tells of it is gone") {
     lines.resize(5);
     write_lines(folder.file(), lines);
-    fs::remove(folder.file("audit.head"));
-    CHECK(check(0, "audit.head: the end may have been cut off", "which names the last record") == 1);
-    write_log({.file = folder.file()}, 1);
-    CHECK(read(folder.file()).find("audit.head is missing: the end of the file may have been cut off") !=
-          std::string::npos);
+    check_without_head();
   }
   SECTION("cut off to where the gateway had stopped before, and what tells of it is gone") {
     write_log({.file = folder.file()}, 2);
     write_lines(folder.file(), lines);
-    fs::remove(folder.file("audit.head"));
-    CHECK(check(0, "audit.head: the end may have been cut off", "which names the last record") == 1);
-    write_log({.file = folder.file()}, 1);
-    CHECK(read(folder.file()).find("audit.head is missing: the end of the file may have been cut off") !=
-          std::string::npos);
+    check_without_head();
   }
   SECTION("cut off at the end, and what tells of it was changed to match") {
     write_lines(folder.file(), lines);
