@@ -72,7 +72,11 @@ describe("a row of a function", () => {
   const texts = () => [...document.querySelectorAll<HTMLInputElement>("input")].map(({ value }) => value);
 
   test("keeps what was typed over an outage, but not for another parameter", async () => {
-    const update = show(ObjectView, { object: objectOf("speed"), live: true, route: {} } as unknown as ObjectViewProps);
+    const update = show(ObjectView, {
+      object: objectOf("speed"),
+      live: true,
+      route: { path: [] },
+    } as unknown as ObjectViewProps);
     await settle();
     await enter(find<HTMLInputElement>("input"), "5");
     await update({ object: objectOf("speed") });

@@ -1,5 +1,6 @@
 // The right to command, as the pages show it: taken with the first command, refused, taken over, lost, given back.
 import type { Page, WebSocketRoute } from "@playwright/test";
+import { addPanel } from "../board";
 import { expect, openRobot, putAtStart, test, waitUntilDriving, waitUntilStopped } from "../lab_test";
 import { startGateway, webRoot } from "../processes";
 
@@ -196,6 +197,40 @@ test("a robot without leases is driven without one, and the page says so", async
     await page.keyboard.up("ArrowUp");
     await waitUntilStopped(page);
     await expect(page.getByText("Nobody gives leases of it")).toBeVisible();
+  } finally {
+    await program.kill();
+  }
+});
+
+test("a member that only its holder may use offers control where it was refused", async ({ page, lab }) => {
+  const leases = { members: [{ member: "Create.Drive", lease: "required" }] };
+  const devices = [{ name: "create", url: lab.createUrl, mode: "shared", leases }];
+  const { program, url } = await startGateway("create", lab.createUrl, webRoot, { devices });
+  try {
+    await page.goto(`${url}#/devices/create/Create?view=members`);
+    const drive = page.locator('[data-member="Drive"]');
+    const call = drive.getByRole("button", { name: "Call Drive" });
+    await drive.getByLabel("velocity").fill("0");
+    await drive.getByLabel("radius").fill("0");
+    await expect(drive.locator("[data-control]")).toHaveCount(0);
+    await call.click();
+    await expect(drive.getByRole("alert")).toContainText("this needs the lease of");
+    await drive.getByRole("button", { name: "Take control" }).click();
+    await expect(drive.locator("[data-control]")).toHaveAttribute("data-control", "held");
+    await call.click();
+    await expect(drive.locator("output").first()).toContainText("done");
+    await drive.getByRole("button", { name: "Give back" }).click();
+    await expect(drive.locator("[data-control]")).toHaveAttribute("data-control", "idle");
+
+    await page.goto(`${url}#/devices/create/Create?view=board`);
+    await addPanel(page, "form");
+    const form = page.locator('[data-panel="form"]').last();
+    await form.getByLabel("Member").selectOption("Drive");
+    await form.getByRole("button", { name: "Call Drive" }).click();
+    await expect(form.getByRole("alert")).toContainText("this needs the lease of");
+    await form.getByRole("button", { name: "Take control" }).click();
+    await form.getByRole("button", { name: "Call Drive" }).click();
+    await expect(form.locator("output")).toContainText("done");
   } finally {
     await program.kill();
   }

@@ -47,6 +47,17 @@ export function formatRoute(
   return `#/devices/${segments.join("/")}${view === "auto" ? "" : `?view=${view}`}`;
 }
 
+/** Where an object is, as the gateway and boards name it: "" is the service's root. */
+export function placeOf({ device, service, path }: Route & { page: "service" }): Place {
+  return { device, service, object: path.map(formatStep).join(".") };
+}
+
+export interface Place {
+  device: string;
+  service: string;
+  object: string;
+}
+
 export function formatStep(step: PathStep): string {
   return step.index === null ? step.member : `${step.member}[${step.index}]`;
 }

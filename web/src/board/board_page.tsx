@@ -3,7 +3,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { formatRoute, formatStep } from "../app/router";
+import { formatRoute, formatStep, placeOf } from "../app/router";
 import type { Route } from "../app/router";
 import { useStore } from "../app/store";
 import { devicesOf, isShared } from "../gateway/devices";
@@ -49,7 +49,8 @@ export interface BoardPageProps {
 }
 
 export default function BoardPage({ link, route, list, onlyStop }: BoardPageProps) {
-  const path = route.path.map(formatStep).join(".");
+  const place = placeOf(route);
+  const path = place.object;
   const key = boardKey(route);
   const { object, reach, last, failure } = useObject(link, "", path, list);
   const preset = useMemo(() => {
@@ -139,7 +140,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
             <PanelFrame
               panel={panel}
               link={link}
-              place={{ device: route.device, service: route.service, object: path }}
+              place={place}
               services={services}
               list={list}
               arranging={arranging}

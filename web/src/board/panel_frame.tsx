@@ -4,6 +4,7 @@
 import type { ComponentType } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
+import type { Place } from "../app/router";
 import type { DeviceList } from "../gateway/devices";
 import { useDefinitions } from "../live/definitions";
 import { useObject } from "../live/links";
@@ -22,7 +23,7 @@ import { stopWithout, useSafe } from "./stop";
 export interface PanelFrameProps {
   panel: Panel;
   link: Link;
-  place: { device: string; service: string; object: string };
+  place: Place;
   services: readonly string[];
   list: DeviceList;
   arranging: boolean;

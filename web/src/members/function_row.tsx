@@ -3,9 +3,10 @@
 
 import { useState } from "preact/hooks";
 import { t } from "../app/language";
-import { Failure } from "../ui/failure";
+import { placeOf } from "../app/router";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
+import { Refusal } from "./refusal";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
@@ -15,7 +16,7 @@ interface Answer {
   tookMs: number;
 }
 
-export function FunctionRow({ object, member, live }: MemberRowProps) {
+export function FunctionRow({ object, member, live, route }: MemberRowProps) {
   const [texts, setTexts] = useState(() => member.parameters.map((p) => initialText(p.type)));
   const [answer, setAnswer] = useState<Answer | null>(null);
   const calling = useAction();
@@ -62,7 +63,12 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
           )}
         </output>
       </div>
-      <Failure text={calling.failure} />
+      <Refusal
+        failure={calling.failure}
+        isLocked={calling.isLocked}
+        object={live ? object : null}
+        place={placeOf(route)}
+      />
     </form>
   );
 }

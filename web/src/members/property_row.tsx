@@ -3,15 +3,17 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { placeOf } from "../app/router";
 import { Failure } from "../ui/failure";
 import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
+import { Refusal } from "./refusal";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
 
-export function PropertyRow({ object, member, live }: MemberRowProps) {
+export function PropertyRow({ object, member, live, route }: MemberRowProps) {
   const readable = !member.modifiers.includes("writeonly");
   const writable = !member.modifiers.includes("readonly");
   const reading = useAction();
@@ -66,7 +68,12 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
           </button>
         </form>
       )}
-      <Failure text={writing.failure} />
+      <Refusal
+        failure={writing.failure}
+        isLocked={writing.isLocked}
+        object={live ? object : null}
+        place={placeOf(route)}
+      />
     </>
   );
 }

@@ -3,6 +3,7 @@
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import type { Route } from "../app/router";
+import { isLocked } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Member, Remote } from "../robot/remote";
 import { flowing } from "../ui/words";
@@ -34,6 +35,8 @@ export function RowHead({ member, signature }: { member: Member; signature?: str
 export interface Action {
   busy: boolean;
   failure: string | null;
+  /** It failed because this page does not have the right to command. */
+  isLocked: boolean;
   run(work: () => Promise<void>): void;
   fail(text: string): void;
 }
@@ -42,6 +45,7 @@ export interface Action {
 export function useAction(): Action {
   const [busy, setBusy] = useState(false);
   const [failure, setFailure] = useState<string | null>(null);
+  const [wasLocked, setLocked] = useState(false);
   const mounted = useRef(true);
   useEffect(() => {
     mounted.current = true;
@@ -50,13 +54,16 @@ export function useAction(): Action {
   const run = useCallback((work: () => Promise<void>) => {
     setBusy(true);
     setFailure(null);
+    setLocked(false);
     work()
       .catch((error: unknown) => {
-        if (mounted.current) setFailure(explain(error));
+        if (!mounted.current) return;
+        setFailure(explain(error));
+        setLocked(isLocked(error));
       })
       .finally(() => {
         if (mounted.current) setBusy(false);
       });
   }, []);
-  return { busy, failure, run, fail: setFailure };
+  return { busy, failure, isLocked: wasLocked, run, fail: setFailure };
 }

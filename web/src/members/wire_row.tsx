@@ -3,6 +3,7 @@
 
 import { useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { placeOf } from "../app/router";
 import { Plot } from "../chart/plot";
 import { formatRate } from "../live/rate";
 import { useEach, useFeed } from "../live/use_feed";
@@ -11,18 +12,19 @@ import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { readingsOf } from "../values/numeric";
 import { parseInput } from "../values/parse";
+import { Refusal } from "./refusal";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
 
-export function WireRow({ object, member, live }: MemberRowProps) {
+export function WireRow({ object, member, live, route }: MemberRowProps) {
   const readable = !member.modifiers.includes("writeonly");
   const writable = !member.modifiers.includes("readonly");
   return (
     <>
       <RowHead member={member} />
       {readable && <WireReader object={object} name={member.name} live={live} />}
-      {writable && <WireWriter object={object} name={member.name} type={member.type} live={live} />}
+      {writable && <WireWriter object={object} name={member.name} type={member.type} live={live} route={route} />}
     </>
   );
 }
@@ -72,12 +74,8 @@ function WireWriter({
   name,
   type,
   live,
-}: {
-  object: MemberRowProps["object"];
-  name: string;
-  type: string;
-  live: boolean;
-}) {
+  route,
+}: Omit<MemberRowProps, "member"> & { name: string; type: string }) {
   const [text, setText] = useState(initialText(type));
   const sending = useAction();
   const send = (event: Event): void => {
@@ -100,7 +98,12 @@ function WireWriter({
           <span class="unseen"> {name}</span>
         </button>
       </form>
-      <Failure text={sending.failure} />
+      <Refusal
+        failure={sending.failure}
+        isLocked={sending.isLocked}
+        object={live ? object : null}
+        place={placeOf(route)}
+      />
     </>
   );
 }

@@ -3,9 +3,9 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { Refusal } from "../members/refusal";
 import { useAction } from "../members/row";
 import type { Member } from "../robot/remote";
-import { Failure } from "../ui/failure";
 import { clockTime, flowing } from "../ui/words";
 import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
 import { rowsOf } from "../values/rows";
@@ -179,11 +179,14 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           </tbody>
         </table>
       )}
-      <Failure
-        text={
+      <Refusal
+        failure={
           doing.failure ??
           (emptied.length > 0 ? t("Emptied, since its type has changed: {0}", emptied.join(", ")) : null)
         }
+        isLocked={doing.isLocked}
+        object={object}
+        place={place}
       />
       {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
       {withMore && done.length > 0 && <History done={done} take={take} />}

@@ -4,9 +4,9 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
+import { Refusal } from "../members/refusal";
 import { onStop } from "../robot/control";
 import type { Member } from "../robot/remote";
-import { Failure } from "../ui/failure";
 import { clockTimeMs } from "../ui/words";
 import { makeDraft, valueOf } from "../values/draft";
 import type { Draft } from "../values/draft";
@@ -44,7 +44,7 @@ export default function GeneratorPanel(props: PanelProps) {
   );
 }
 
-function Run({ object, definitions, scope, member }: PanelProps & { member: Member }) {
+function Run({ object, definitions, scope, place, member }: PanelProps & { member: Member }) {
   const plain = member.parameters.filter(({ type }) => !type.endsWith("{generator}"));
   const stepped = member.parameters.find(({ type }) => type.endsWith("{generator}"));
   const stepType = stepped?.type.replace(/\{generator\}$/, "") ?? "";
@@ -127,7 +127,7 @@ function Run({ object, definitions, scope, member }: PanelProps & { member: Memb
           {state === "stopping" ? t("stopping: the device answers the step under way first") : t(state)}
         </span>
       </div>
-      <Failure text={failure} />
+      <Refusal failure={failure} isLocked={run.isLocked} object={object} place={place} />
       <ol class="log" tabIndex={0} aria-label={t("Results of {0}", member.name)}>
         {results.map(({ number, time, text }) => (
           <li key={number}>

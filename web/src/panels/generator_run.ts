@@ -4,6 +4,7 @@
 import { ErrorCode, RobotRaconteurError } from "rrgate-client";
 import { t } from "../app/language";
 import { Store } from "../app/store";
+import { isLocked } from "../robot/control";
 import { explain } from "../robot/remote";
 
 export type RunState = "ready" | "stepping" | "running" | "held" | "stopping" | "ended" | "stopped" | "not stopped";
@@ -12,6 +13,8 @@ type Values = AsyncGenerator<unknown, void, unknown>;
 export class GeneratorRun {
   readonly state = new Store<RunState>("ready");
   readonly failure = new Store<string | null>(null);
+  /** It failed because this page does not have the right to command. */
+  isLocked = false;
   readonly #heard: (value: unknown) => void;
   #values: Values | null = null;
   #goesOn = false;
@@ -26,6 +29,7 @@ export class GeneratorRun {
 
   /** A step, or one after another until it ends or is stopped. `given`: what the device is told with each. */
   async go(byItself: boolean, begin: () => Values, given: () => unknown): Promise<void> {
+    this.isLocked = false;
     this.failure.value = null;
     this.#goesOn = byItself;
     this.state.value = byItself ? "running" : "stepping";
@@ -41,6 +45,7 @@ export class GeneratorRun {
       if (!this.#isStopping) this.state.value = "held";
     } catch (error) {
       if (this.#values !== mine || (this.#isStopping && isAborted(error))) return;
+      this.isLocked = isLocked(error);
       this.failure.value = explain(error);
       if (this.#isStopping) return;
       this.#end("ended");

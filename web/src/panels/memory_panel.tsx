@@ -3,9 +3,9 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { Refusal } from "../members/refusal";
 import { useAction } from "../members/row";
 import type { Member, Remote } from "../robot/remote";
-import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
 import { hexLines, greyPicture } from "./bytes";
@@ -18,7 +18,7 @@ type View = "array" | "hex" | "image";
 const VIEWS: readonly View[] = ["hex", "array", "image"];
 const AT_FIRST = 256;
 
-export default function MemoryPanel({ object, members, settings, change }: PanelProps) {
+export default function MemoryPanel({ object, place, members, settings, change }: PanelProps) {
   const choices = membersFor("memory", members);
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
@@ -42,20 +42,21 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
           </select>
         </label>
       </div>
-      <Items key={name} object={object} name={name} member={member} view={view} />
+      <Items key={name} object={object} place={place} name={name} member={member} view={view} />
     </div>
   );
 }
 
 interface ItemsProps {
   object: Remote | null;
+  place: PanelProps["place"];
   name: string;
   member: Member | undefined;
   view: View;
 }
 
 /** Of one memory: what is answered late is not shown as another's. */
-function Items({ object, name, member, view }: ItemsProps) {
+function Items({ object, place, name, member, view }: ItemsProps) {
   const [size, setSize] = useState<readonly number[]>([]);
   const [position, setPosition] = useState("0");
   const [count, setCount] = useState(String(AT_FIRST));
@@ -100,7 +101,7 @@ function Items({ object, name, member, view }: ItemsProps) {
         </button>
         <p class="note">{size.length === 0 ? "" : t("{0} items", size.join(" × "))}</p>
       </form>
-      <Failure text={acting.failure} />
+      <Refusal failure={acting.failure} isLocked={acting.isLocked} object={object} place={place} />
       {shown && <Shown {...shown} view={view} />}
       {member && !member.modifiers.includes("readonly") && (
         <form class="row-line row-form" onSubmit={write}>

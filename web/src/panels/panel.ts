@@ -2,6 +2,7 @@
 // Layer: web/panels.
 
 import type { ComponentType } from "preact";
+import type { Place } from "../app/router";
 import type { PanelKind, Settings } from "../board/board";
 import { isGenerator } from "../robot/remote";
 import type { Member, MemberKind, Remote } from "../robot/remote";
@@ -23,7 +24,7 @@ export interface PanelProps {
   /** The definition in which the types of its members are named. */
   scope: string;
   /** Address of the object for examples of code. */
-  place: { device: string; service: string; object: string };
+  place: Place;
   settings: Settings;
   change: (settings: Settings) => void;
 }

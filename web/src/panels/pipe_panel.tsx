@@ -4,8 +4,8 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useEach, useFeed } from "../live/use_feed";
+import { Refusal } from "../members/refusal";
 import { useAction } from "../members/row";
-import { Failure } from "../ui/failure";
 import { clockTimeMs } from "../ui/words";
 import { makeDraft, valueOf } from "../values/draft";
 import { formatValue } from "../values/format";
@@ -75,7 +75,7 @@ function Packets({ object, name }: { object: PanelProps["object"]; name: string 
   );
 }
 
-function SendForm({ object, definitions, scope, name, type }: PanelProps & { name: string; type: string }) {
+function SendForm({ object, definitions, scope, place, name, type }: PanelProps & { name: string; type: string }) {
   const [draft, setDraft] = useState(() => makeDraft(type, definitions, scope));
   const [sent, setSent] = useState(0);
   const outlet = useMemo(() => (object ? new Outlet(() => object.openPipe(name)) : null), [object, name]);
@@ -99,7 +99,7 @@ function SendForm({ object, definitions, scope, name, type }: PanelProps & { nam
         </button>
         {sent > 0 && <output class="note">{t("{0} sent", sent)}</output>}
       </div>
-      <Failure text={sending.failure} />
+      <Refusal failure={sending.failure} isLocked={sending.isLocked} object={object} place={place} />
     </form>
   );
 }

@@ -117,12 +117,15 @@ export class Control {
 
   #lose(reason: unknown): void {
     this.#lease = null;
-    const byOthers = codeOf(reason) === ErrorCode.ObjectLockedError || /taken over/.test(explain(reason));
+    const byOthers = isLocked(reason) || /taken over/.test(explain(reason));
     this.state.value = { kind: "lost", reason: t("You are not in control: {0}", explain(reason)), byOthers };
   }
 }
 
 const doubt = (reason: unknown): string => t("You may not be in control any more: {0}", explain(reason));
+
+/** Whether a command was refused because its sender does not have the right to command, or another has it. */
+export const isLocked = (error: unknown): boolean => codeOf(error) === ErrorCode.ObjectLockedError;
 
 function codeOf(error: unknown): number | undefined {
   return error instanceof RobotRaconteurError ? error.code : undefined;
@@ -154,7 +157,7 @@ export async function stopNow(
   try {
     await stop();
   } catch (error) {
-    if (codeOf(error) !== ErrorCode.ObjectLockedError) throw error;
+    if (!isLocked(error)) throw error;
     if (await object.locks.giveUp(object.path)) return stopNow(object, insists, stop);
     if (!insists) return;
     const timeout = 2_000;

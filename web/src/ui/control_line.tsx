@@ -2,6 +2,7 @@
 
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { t } from "../app/language";
+import type { Place } from "../app/router";
 import { Store, useStore } from "../app/store";
 import { isUsb } from "../gateway/usb_devices";
 import { endOfLease, nameOfHolder, useHolders } from "../live/holders";
@@ -39,15 +40,11 @@ export interface ControlLineProps {
   isThere: boolean;
   /** What is commanded: who else has it is shown. */
   place: Place;
+  /** No command takes it by itself. */
+  byHand?: boolean;
 }
 
-interface Place {
-  device: string;
-  service: string;
-  object: string;
-}
-
-export function ControlLine({ control, isThere, place }: ControlLineProps) {
+export function ControlLine({ control, isThere, place, byHand = false }: ControlLineProps) {
   const state = useStore(control?.state ?? NOBODY);
   if (state.kind === "free") return <p class="control-line note">{t("Nobody gives leases of it: all may command.")}</p>;
   const take = (takeover: boolean): void => void control?.take(takeover).catch(() => undefined); // the state says why not
@@ -75,7 +72,9 @@ export function ControlLine({ control, isThere, place }: ControlLineProps) {
           ? t("You are in control since {0}.", clockTime(state.since))
           : "reason" in state
             ? state.reason
-            : t("Your first command takes control.")}
+            : byHand
+              ? ""
+              : t("Your first command takes control.")}
       </p>
     </div>
   );
