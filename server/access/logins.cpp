@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <set>
 
 #include "node/tls/digest.hpp"
 
@@ -85,14 +86,23 @@ rr::awaitable<Logins::Judged> Logins::judge(rr::LoginAttempt attempt, ClientOrig
       token);
 }
 
-/// A network that has not failed lately, so that a flood of wrong passwords keeps its own senders waiting. Of four
-/// turns one is the others' too: somebody may have mistyped.
+/// A network that has not failed lately, of these one that has the fewest passwords waiting: a flood of wrong ones
+/// keeps its own senders waiting, also while none of theirs has been judged. Of four turns one is the others' too:
+/// somebody may have mistyped.
 std::deque<std::string>::iterator Logins::next_turn() {
   if (turns_taken_++ % 4 == 3) return turns_.begin();
   const auto now = steady_clock_now();
-  const auto found = std::find_if(turns_.begin(), turns_.end(),
-                                  [&](const std::string& each) { return !limits_.has_failed_lately(each, now); });
-  return found != turns_.end() ? found : turns_.begin();
+  return std::ranges::min_element(turns_, {}, [&](const std::string& network) {
+    return std::pair(limits_.has_failed_lately(network, now), passwords_of(network));
+  });
+}
+
+/// How many different ones are waiting: a page sends one and the same with each of its requests.
+std::size_t Logins::passwords_of(const std::string& network) const {
+  const auto& jobs = waiting_.at(network);
+  std::set<std::string_view> keys;
+  for (const auto& job : jobs) keys.insert(job.key);
+  return keys.size();
 }
 
 void Logins::judge_next() {

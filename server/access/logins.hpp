@@ -66,6 +66,7 @@ class Logins {
   };
 
   std::deque<std::string>::iterator next_turn();
+  std::size_t passwords_of(const std::string& network) const;
   void judge_next();
   void finish(const Job& job, const Judged& result);
   void record(const rr::LoginAttempt& attempt, const ClientOrigin& from, const Judged& result);

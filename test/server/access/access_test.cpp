@@ -402,6 +402,32 @@ TEST_CASE("sessions that log in at once with one password are each recorded") {
   CHECK(clients == std::vector<std::string>{"192.0.2.1:1", "192.0.2.1:2", "192.0.2.1:3"});
 }
 
+TEST_CASE("a right password does not wait for a flood of others, also while none of them has been judged") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  boost::asio::io_context io{1};
+  const auto work = boost::asio::make_work_guard(io);
+  Logins logins(io.get_executor(), access);
+  int refused = 0;
+  bool is_in = false;
+  const auto judge = [&](const std::string& network, const std::string& password, const Logins::Done& done) {
+    rr::LoginAttempt attempt;
+    attempt.username = "alice";
+    attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(password)));
+    logins.judge(std::move(attempt), {.client = network + ":1", .network = network, .face = Face::native},
+                 Logins::Of::request, done);
+  };
+  for (int i = 0; i < 150; ++i)
+    judge("192.0.2." + std::to_string(i % 50), "guess " + std::to_string(i),
+          [&](const Logins::Judged& user) { refused += user ? 0 : 1; });
+  judge("198.51.100.1", "one", [&](const Logins::Judged& user) { is_in = user.has_value(); });
+  while (!is_in && refused < 50 && io.run_one_for(std::chrono::seconds(10)) > 0) continue;
+  CHECK(is_in);
+  CHECK(refused <= 2);  // what was under way, and the turn of those that have failed
+}
+
 TEST_CASE("what is asked for too often is recorded once of a network and minute, and the sum of it") {
   Files files;
   files.write("users", Files::user("alice", "one", "viewer"));
