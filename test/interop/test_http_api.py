@@ -116,6 +116,30 @@ def test_objects(gateway):
     assert {"name": "version", "kind": "property", "type": "string", "direction": "readonly"} in described["members"]
 
 
+def test_a_large_document_keeps_nobody_waiting(gateway):
+    """Values of 8 MB, as JSON of 5 MB: they are read, made values of, made of values and freed beside the gateway's thread."""
+    numbers = json.dumps([1.5] * 1_000_000).encode()
+    header = {"Content-Type": "application/json"}
+
+    def share_of_longest(method, body, status):
+        """How much of the time that it took somebody else waited for one answer."""
+        large = threading.Thread(target=lambda: answers.append(ask(gateway, method, "/p_doubles", body, headers=header)))
+        answers, longest, begin = [], 0, time.monotonic()
+        large.start()
+        while large.is_alive():
+            asked = time.monotonic()
+            assert http_api.ask(gateway, "GET", "/healthz").status == 200
+            longest = max(longest, time.monotonic() - asked)
+        assert answers[0].status == status
+        return longest / (time.monotonic() - begin)
+
+    asked = [("PUT", numbers, 204), ("GET", None, 200), ("PUT", b'{"no": ' + numbers + b"}", 400)]
+    # The machine may be busy with something else, but not each time.
+    shares = {f"{method} {status}": min(share_of_longest(method, body, status) for _ in range(8)) for method, body, status in asked}
+    ask(gateway, "PUT", "/p_doubles", [])
+    assert max(shares.values()) < 0.15, shares
+
+
 def test_memories(gateway):
     assert ask(gateway, "GET", "/m_numbers/shape").json == [100]
     assert ask(gateway, "GET", "/m_numbers?offset=3&count=2").json == [3, 4]

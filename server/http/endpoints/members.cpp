@@ -15,10 +15,7 @@ namespace {
 rr::awaitable<Response> value_response(const ObjectRequest& request, const Target& target, const rr::Value& value) {
   const auto& type = target.member->type;
   const auto wanted = request.wanted_image();
-  if (wanted.empty() || !is_image_type(type, target.types())) {
-    const auto json = to_json(target, value, request.form());
-    co_return co_await request.value_response(json);
-  }
+  if (wanted.empty() || !is_image_type(type, target.types())) co_return co_await request.value_response(target, value);
   const auto work = value_or_throw(prepare_image(value, type, target.types(), wanted));
   auto room = request.writer().memory().sibling();
   if (!room.resize(3 * work.data.bytes().size())) co_return no_memory_response();  // the rows, and what becomes of them
@@ -30,10 +27,10 @@ rr::awaitable<Response> value_response(const ObjectRequest& request, const Targe
 }
 
 rr::awaitable<rr::Value> body_value(const ObjectRequest& request, const Target& target) {
-  const auto body = co_await request.body();
-  if (!body) throw rr::Exception(body.error());
-  co_return value_or_throw(
-      rr::value_from_json(*body, target.member->type, target.types(), request.form(), target.member->name));
+  const auto make = [&](const rr::Json& body) {
+    return rr::value_from_json(body, target.member->type, target.types(), request.form(), target.member->name);
+  };
+  co_return value_or_throw(co_await request.from_body(make));
 }
 
 /// A property, or a wire as a value: the newest in, the newest out.
@@ -63,9 +60,7 @@ rr::awaitable<Response> answer_function(const ObjectRequest& request, const Targ
   const auto value = co_await target.client->ask(std::move(called));
   if (!request.wanted_image().empty() && is_image_type(member.type, target.types()))
     co_return co_await value_response(request, target, value);
-  auto result = rr::OrderedJson::object();
-  rr::add_key(result, "result") = to_json(target, value, request.form());
-  co_return co_await request.value_response(result);
+  co_return co_await request.value_response(target, value, "result");
 }
 
 // --- memories ---
@@ -173,8 +168,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
 
   const auto shape = co_await memory_shape(target);
   if (target.is_shape) {
-    const rr::OrderedJson json(shape);
-    co_return co_await request.value_response(json);
+    co_return co_await request.value_response(rr::OrderedJson(shape));
   }
 
   const auto position = read_shape(request, "offset", shape.size());
@@ -207,8 +201,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     const auto bytes = rr::as_text(payload_of(items));
     co_return text_response(200, "application/octet-stream", std::string(bytes));
   }
-  const auto json = to_json(target, items, request.form());
-  co_return co_await request.value_response(json);
+  co_return co_await request.value_response(target, items);
 }
 
 }  // namespace
@@ -217,9 +210,8 @@ rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectReq
                                                                  const rr::MemberDefinition& member,
                                                                  const rr::TypeRegistry& types) {
   if (member.parameters.empty() && request.request().message.body().empty()) co_return std::vector<rr::Value>();
-  const auto body = co_await request.body();
-  if (!body) co_return body.error();
-  co_return arguments_from_json(*body, member, types, request.form());
+  const auto make = [&](const rr::Json& body) { return arguments_from_json(body, member, types, request.form()); };
+  co_return co_await request.from_body(make);
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {

@@ -2,9 +2,11 @@
 #include "server/http/endpoints/large_json.hpp"
 
 #include "core/session/service_path.hpp"
+#include "core/types/value_size.hpp"
 #include "node/tls/base64.hpp"
 #include "node/values/exception.hpp"
 #include "server/http/endpoints/image_values.hpp"
+#include "server/http/endpoints/member_values.hpp"
 #include "server/state/http_access.hpp"
 
 namespace rrgate {
@@ -149,22 +151,29 @@ bool ObjectRequest::has_bytes_body() const {
   return equals_ignoring_case(media_type(request().header(http::field::content_type)), "application/octet-stream");
 }
 
-rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
+bool ObjectRequest::has_cbor_body() const {
+  return equals_ignoring_case(media_type(request().header(http::field::content_type)), "application/cbor");
+}
+
+bool ObjectRequest::has_large_body() const {
+  return request().message.body().size() > large_json_bytes;
+}
+
+/// Takes room for what the body becomes.
+rr::awaitable<rr::Result<>> ObjectRequest::admit_body(MemoryBudget::Charge& room) const {
   const auto type = media_type(request().header(http::field::content_type));
   const auto& text = request().message.body();
-  const bool is_cbor = equals_ignoring_case(type, "application/cbor");
+  const bool is_cbor = has_cbor_body();
   // A page of another origin can send text/plain without being asked; JSON it can't.
   if (!is_cbor && !equals_ignoring_case(type, "application/json"))
     co_return rr::make_error(rr::ErrorCode::invalid_argument,
                              "Content-Type is " + rr::quote(type) + ", expected application/json or application/cbor");
-  const bool is_large = text.size() > large_json_bytes;
   const auto measure = [&text, is_cbor] {
     return is_cbor ? rr::memory_of_cbor(rr::as_bytes(text)) : rr::memory_of_json(text);
   };
-  auto room = writer_.memory().sibling();
   // Named: g++ 12 destroys twice what a co_await within ?: gives.
   std::size_t needed = 0;
-  if (is_large)
+  if (has_large_body())
     needed = co_await gateway_.workers().run(measure);
   else
     needed = measure();
@@ -174,26 +183,44 @@ rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
                              "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
                                  " bytes becomes; try again in a moment");
-  const auto read = [&text, is_cbor] { return is_cbor ? rr::read_cbor(rr::as_bytes(text)) : rr::read_json(text); };
-  if (!is_large) co_return read();
-  co_return co_await gateway_.workers().run(read);
+  co_return rr::Result<>();
 }
 
-rr::awaitable<Response> ObjectRequest::value_response(const rr::OrderedJson& json) const {
+rr::Result<rr::Json> ObjectRequest::read_body() const {
+  const auto& text = request().message.body();
+  return has_cbor_body() ? rr::read_cbor(rr::as_bytes(text)) : rr::read_json(text);
+}
+
+rr::awaitable<Response> ObjectRequest::value_response(const Target& target, const rr::Value& value,
+                                                      std::string_view name) const {
+  const auto make = [&] {
+    auto json = to_json(target, value, form_);
+    if (name.empty()) return json;
+    auto named = rr::OrderedJson::object();
+    rr::add_key(named, name) = std::move(json);
+    return named;
+  };
+  if (rr::held_bytes(value) <= large_json_bytes) co_return co_await value_response(make());
+  auto json = co_await gateway_.workers().run(make);
+  co_return co_await value_response(std::move(json));
+}
+
+rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
+  const auto held = held_bytes(json);
+  auto room = writer_.memory().sibling();
+  if (held > large_json_bytes && !room.resize(held)) co_return no_memory_response();
   const bool is_cbor = wanted_ == BodyForm::cbor;
-  const auto write = [&json, is_cbor] {
+  // It is the worker that frees a large one, too: that takes as long as to write it.
+  auto write = [json = std::move(json), is_cbor] {
     if (!is_cbor) return rr::write_json(json) + "\n";
     const auto bytes = rr::write_cbor(json);
     return std::string(bytes.begin(), bytes.end());
   };
-  auto room = writer_.memory().sibling();
   std::string body;
-  if (const auto held = held_bytes(json); held <= large_json_bytes) {
+  if (held <= large_json_bytes)
     body = write();
-  } else {
-    if (!room.resize(held)) co_return no_memory_response();
-    body = co_await gateway_.workers().run(write);
-  }
+  else
+    body = co_await gateway_.workers().run(std::move(write));
   auto response = text_response(200, is_cbor ? "application/cbor" : "application/json", std::move(body));
   response.set("Cache-Control", "no-store");
   co_return response;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "server/http/response_writer.hpp"
@@ -70,19 +71,39 @@ class ObjectRequest {
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
 
-  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type;
-  /// out_of_system_resource: there is no memory left for it.
-  rr::awaitable<rr::Result<rr::Json>> body() const;
+  /// What `make` makes of the body, read by Content-Type; on a worker where the body is large. Errors   those of
+  /// `make`; data_serialization_error; invalid_argument: another type; out_of_system_resource: there is no memory left
+  /// for it.
+  template <class Make>
+  rr::awaitable<std::invoke_result_t<Make, const rr::Json&>> from_body(Make make) const {
+    auto room = writer_.memory().sibling();
+    if (const auto admitted = co_await admit_body(room); !admitted) co_return admitted.error();
+    const auto work = [this, &make]() -> std::invoke_result_t<Make, const rr::Json&> {
+      const auto json = read_body();
+      if (!json) return json.error();
+      return make(*json);
+    };
+    if (!has_large_body()) co_return work();
+    co_return co_await gateway_.workers().run(work);
+  }
   bool has_bytes_body() const;
 
-  /// `json`  is borrowed for the wait.
-  rr::awaitable<Response> value_response(const rr::OrderedJson& json) const;
+  rr::awaitable<Response> value_response(rr::OrderedJson json) const;
+  /// The same of `value` as JSON, or of an object with that alone; made on a worker where it is large. Borrows for the
+  /// wait.
+  rr::awaitable<Response> value_response(const Target& target, const rr::Value& value,
+                                         std::string_view name = {}) const;
   Response written_response() const;  ///< 204
   Response error_response(const rr::Error& error, const rr::TypeRegistry* types) const;
   /// 405 with what is possible.
   Response method_response(std::string_view allowed) const;
 
  private:
+  bool has_cbor_body() const;
+  bool has_large_body() const;
+  rr::awaitable<rr::Result<>> admit_body(MemoryBudget::Charge& room) const;
+  rr::Result<rr::Json> read_body() const;
+
   ResponseWriter& writer_;
   GatewayState& gateway_;
   BodyForm wanted_ = BodyForm::json;
