@@ -38,6 +38,19 @@ void find_ways_around(const Config& config, std::vector<Finding>& out) {
   }
 }
 
+/// Devices whose sessions pass unread, though somebody wants to know what is done.
+void find_unrecorded(const Config& config, std::vector<Finding>& out) {
+  if (config.access.audit.file.empty()) return;
+  const auto is_relayed = [](const auto& each) { return each.mode == DeviceMode::relay; };
+  const auto relayed = std::find_if(config.devices.begin(), config.devices.end(), is_relayed);
+  const std::string relay =
+      "relay: what clients do in sessions that the gateway passes on unread is not in the audit log";
+  if (relayed != config.devices.end())
+    out.push_back({"/devices/" + std::to_string(relayed - config.devices.begin()) + "/mode", relay});
+  else if (config.discover.is_enabled && is_relayed(config.discover))
+    out.push_back({"/discover/mode", relay});
+}
+
 }  // namespace
 
 std::vector<Finding> find_cautions(const Config& config) {
@@ -61,6 +74,7 @@ std::vector<Finding> find_cautions(const Config& config) {
   if (!config.tls.certificates.empty() && access.has_users() && !config.tls.is_required)
     out.push_back({"/tls/required", "false: a password or a token that is sent in clear is taken"});
   find_ways_around(config, out);
+  find_unrecorded(config, out);
   return out;
 }
 

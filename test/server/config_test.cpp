@@ -191,6 +191,12 @@ TEST_CASE("what may not be meant is no mistake, but is told") {
   const std::string by_id =
       R"({"name": "c", "url": "rrs+tcp://h:1/?nodeid=82301bf1-e1ef-4e89-8d8f-0848291587ac&service=s"})";
   CHECK(cautions("", plain + "," + by_tls + "," + by_id) == "/devices/1/url ");
+  const std::string audit = R"(, "audit": {"file": "a"})";
+  CHECK(cautions("", plain).empty());
+  CHECK(cautions(audit, R"({"name": "d", "url": "rr+tcp://h:1/?service=s", "mode": "shared"},)" + plain) ==
+        "/devices/1/mode ");
+  CHECK(cautions(audit + R"(, "discover": {})") == "/discover/mode ");
+  CHECK(cautions(audit + R"(, "discover": {"mode": "shared"})").empty());
   const std::string proxies = R"(, "trusted_proxies": ["127.0.0.1"])";
   CHECK(cautions(proxies) == "/access/rules ");
   CHECK(cautions(proxies + R"(, "access": {"rules": [{"roles": ["a"], "may": ["read"]}]})").empty());
