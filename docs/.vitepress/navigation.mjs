@@ -13,6 +13,7 @@ export const makeSidebar = (decisions) => [
     ["A first device in Python", "/tutorials/python-device"],
     ["A first page", "/tutorials/page"],
     ["A robot", "/tutorials/robot"],
+    ["A robot of the standard types", "/tutorials/standard-robot"],
     ["A robot, a camera and an agent", "/tutorials/agent"],
   ]),
   group("For authors of pages", [

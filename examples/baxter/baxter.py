@@ -98,6 +98,9 @@ class Arm(AbstractRobot):
         self._joint_velocity, self._joint_effort = np.zeros(7), np.zeros(7)
         self._enabled = True
 
+    def halt(self):  # the base class has none
+        self.command_mode = self._robot_command_mode["halt"]
+
     def hand(self):
         """The hand's place and rotation, from the base."""
         at = rox.fwdkin(self._rox_robots[0], self._joint_position)

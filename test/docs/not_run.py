@@ -24,6 +24,7 @@ COMMANDS = {
     ("docs/tutorials/cpp-device.md", "build-examples/thermostat_subscriber"): "test/examples/examples_test.py builds and runs it",
     ("docs/tutorials/page.md", "./dev build"): "builds everything; the test uses what came of it",
     ("docs/tutorials/page.md", "npm install"): "asks the package registry; the test puts the package where npm would",
+    ("docs/tutorials/standard-robot.md", "python3 -m venv"): "asks the package registry; the test has the packages",
     ("examples/baxter/README.md", "python3 -m venv"): "asks the package registry: test/e2e/tests/baxter.spec.ts has it",
     ("examples/baxter/README.md", "baxter/bin/python client.py"): "the same",
     ("examples/conference-room/README.md", "cp -r"): "goes on until it is ended: test/e2e/tests/conference_room.spec.ts does it",

@@ -20,8 +20,10 @@ BEFORE = {
     "docs/tutorials/page.md": ["build-examples/thermostat_device", "mkdir examples/thermostat/node_modules",
                                "ln -s $PWD/wasm-client examples/thermostat/node_modules/rrgate-client"],
     "docs/tutorials/robot.md": ["rrgate demo", "mkdir node_modules", "ln -s $PWD/wasm-client node_modules/rrgate-client"],
+    "docs/tutorials/standard-robot.md": ["rrgate demo baxter --port 8080", "mkdir node_modules",
+                                         "ln -s $PWD/wasm-client node_modules/rrgate-client"],
 }
-RUNS_JAVASCRIPT = ("docs/tutorials/robot.md",)
+RUNS_JAVASCRIPT = ("docs/tutorials/robot.md", "docs/tutorials/standard-robot.md")
 
 
 @pytest.fixture
