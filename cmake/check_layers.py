@@ -68,6 +68,13 @@ def floor_of(path):
     return str(path.parent)
 
 
+def check_place(path):
+    """A folder without a floor could include whatever it likes, and be included by everybody."""
+    has_floor = len(path.parts) < 3 or floor_of(path) in FLOORS and floor_of(path) != path.parts[0]
+    if path.parts[0] in ("core", "node", "server") and not has_floor:
+        yield f"{path.parent} has no floor: FLOORS of cmake/check_layers.py must list it"
+
+
 def check_typescript(path, line_number, imported):
     if path.parts[0] == "web" and "wasm-client" in imported:
         yield f"web must import the client as rrgate-client, not {imported}"
@@ -83,6 +90,8 @@ def findings(root):
             if {"node_modules", "dist"} & set(path.parts) or not file.is_file():
                 continue
             if file.suffix in (".cpp", ".hpp"):
+                for text in check_place(path):
+                    yield f"{path}: {text}"
                 for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
                     if match := INCLUDE.match(line):
                         for text in check_cpp(path, number, match[1] == "<", match[2]):

@@ -30,6 +30,13 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(len(self.report("server/upstream/a.hpp", '#include "server/http/endpoints/objects.hpp"\n')), 1)
         self.assertEqual(self.report("server/http/endpoints/a.hpp", '#include "server/upstream/device.hpp"\n'), [])
 
+    def test_each_folder_has_a_floor(self):
+        for path in ("core/fresh/a.hpp", "node/fresh/a.cpp", "server/fresh/a.hpp"):
+            (found,) = self.report(path, "")
+            self.assertIn("has no floor", found)
+        for path in ("core/wire/fresh/a.hpp", "server/main.cpp", "server/http/fresh/a.hpp", "examples/fresh/a.cpp"):
+            self.assertEqual(self.report(path, ""), [], path)
+
     def test_clients_and_services_do_not_see_each_other(self):
         self.assertEqual(len(self.report("node/service/a.hpp", '#include "node/client/client.hpp"\n')), 1)
         self.assertEqual(len(self.report("core/session/client/a.hpp", '#include "core/session/service/locks.hpp"\n')), 1)
