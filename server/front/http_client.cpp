@@ -321,7 +321,7 @@ std::function<bool(const Identity&)> who_passes(GatewayState& gateway, const Req
 
 void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
   if (failure.status == 0) return;  // the client is gone
-  gateway.reject(Rejection::bad_request);
+  gateway.reject(failure.status == 503 ? Rejection::memory : Rejection::bad_request);
   gateway.log_refusal(LogLevel::info, "request refused", connection.client,
                       {{"peer", connection.client}, {"status", failure.status}, {"detail", failure.detail}});
 }
@@ -370,8 +370,10 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   }
   auto memory = gateway.memory().charge(network_name(request.arrival.address));
   const bool is_urgent = passes && passes(request.identity);
-  if (!admitted.refusal && !is_refused && makes_work(request) && !is_urgent && !memory.has_room(least_room))
+  if (!admitted.refusal && !is_refused && makes_work(request) && !is_urgent && !memory.has_room(least_room)) {
+    gateway.reject(Rejection::memory);
     admitted.refusal = no_memory_response();
+  }
   if (admitted.refusal && asks_for_websocket(request)) {
     co_await write_refusal(gateway, *stream, *admitted.refusal);
     co_await stream->end(rr::no_reason);

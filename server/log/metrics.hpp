@@ -25,14 +25,16 @@ enum class Rejection {
   forbidden,     ///< no right to it
   rate,          ///< asked for more than "rates" allow
   audit,         ///< would be recorded, and can't be: "audit.fail_closed"
+  memory,        ///< a request for which "limits.memory" has no room
 };
-inline constexpr std::array<std::string_view, 14> rejection_names = {"too_many",     "unknown_protocol",
+inline constexpr std::array<std::string_view, 15> rejection_names = {"too_many",     "unknown_protocol",
                                                                      "tls",          "proxy_header",
                                                                      "bad_request",  "host",
                                                                      "origin",       "no_such_device",
                                                                      "device_full",  "device_offline",
                                                                      "unauthorized", "forbidden",
-                                                                     "rate",         "audit"};
+                                                                     "rate",         "audit",
+                                                                     "memory"};
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted

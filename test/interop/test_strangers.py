@@ -100,6 +100,7 @@ def test_bodies_that_nobody_finishes_are_counted_and_bounded(gateway):
     assert metrics["rrgate_memory_budget_bytes"] == MEMORY
     assert 2 * BODY < metrics["rrgate_memory_budget_used_bytes"] <= MEMORY // 2  # one address gets no more
     assert metrics["rrgate_memory_budget_refusals_total"] >= 50
+    assert metrics['rrgate_rejected_total{reason="memory"}'] >= 50
     assert metrics["process_resident_memory_bytes"] - before < MEMORY // 2 + SLACK
     assert [stranger.is_refused() for stranger in strangers].count(True) >= 50
     assert ask(gateway.port, "POST", "/sum", {"values": [1] * 100_000}, base=BASE).json == {"result": 100_000}
