@@ -101,6 +101,15 @@ class Dev(unittest.TestCase):
             self.run_script("bash", "-c", f"set -- help; source {self.folder}/dev >/dev/null; configure release")
             self.assertIn(f"-DBUILD_TESTING={expected}", self.called.read_text().split())
 
+    def test_sources_without_a_repository_are_built(self):
+        """As in an image, whose sources are copied without .git."""
+        self.put("npm", f'echo "$@" >>{self.called}')
+        shutil.copy(ROOT / "dev", self.folder)
+        (self.folder / "web").mkdir()
+        done = self.run_script("bash", "-c", f"set -- help; source {self.folder}/dev >/dev/null; build_page")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+        self.assertEqual(self.called.read_text(), "run --silent build\n")
+
     def test_a_demo_says_first_what_it_installs_and_keeps_what_failed(self):
         self.put("node", "echo v18.20.4")
         self.put("apt-get", "echo Get:1 something; echo no such host >&2; exit 100")

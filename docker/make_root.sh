@@ -11,7 +11,6 @@ install_packages() {
 }
 
 if [ ! -x "$prebuilt/bin/rrgate" ]; then
-  install_packages git
   cd "$source"
   ./dev setup product
   ./dev build
