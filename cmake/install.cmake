@@ -43,9 +43,10 @@ install(FILES "${PROJECT_BINARY_DIR}/rrgateConfig.cmake" "${PROJECT_BINARY_DIR}/
               cmake/rrgate_generate.cmake
         DESTINATION "${package_dir}" COMPONENT dev)
 
-# The page and the documentation, where they were built before, and the schema of configurations.
+# The page, the documentation and the notices of others' work, where they were built before, and the schema of configurations.
 install(DIRECTORY web/dist/ DESTINATION share/rrgate/web COMPONENT runtime OPTIONAL)
 install(DIRECTORY build/docs/ DESTINATION share/rrgate/docs COMPONENT runtime OPTIONAL)
+install(FILES build/third-party.txt DESTINATION share/doc/rrgate COMPONENT runtime OPTIONAL)
 install(FILES gateway-config/gateway.schema.json DESTINATION share/rrgate COMPONENT runtime)
 
 # What runs the gateway as a service. The unit names the program of the prefix, which is known when it is installed.

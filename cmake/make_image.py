@@ -23,7 +23,8 @@ import struct
 import subprocess
 import tarfile
 
-TAKEN = ("usr/bin/rrgate", "usr/libexec/rrgate/", "usr/share/rrgate/", "usr/share/doc/rrgate/copyright")
+TAKEN = ("usr/bin/rrgate", "usr/libexec/rrgate/", "usr/share/rrgate/", "usr/share/doc/rrgate/copyright",
+         "usr/share/doc/rrgate/third-party.txt")
 USERS = {"etc/passwd": b"rrgate:x:10001:10001::/:/nonexistent\n", "etc/group": b"rrgate:x:10001:\n"}
 CAS, CA_BUNDLE = "usr/share/ca-certificates/mozilla/", "etc/ssl/certs/ca-certificates.crt"
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}

@@ -68,7 +68,7 @@ class Image(unittest.TestCase):
         program = elf(architecture, ["libc.so.6", "libssl.so.3"], interpreter)
         ours = self.put_deb("ours", "rrgate", architecture, {
             "usr/bin/rrgate": program, "usr/libexec/rrgate/rrgate-demo-create": elf(architecture, ["libc.so.6"], interpreter),
-            "usr/share/rrgate/web/index.html": b"page", "lib/systemd/system/rrgate.service": b"unit"})
+            "usr/share/rrgate/web/index.html": b"page", "usr/share/doc/rrgate/third-party.txt": b"notices", "lib/systemd/system/rrgate.service": b"unit"})
         # As Debian has them: some in /lib, some in /usr/lib, the names of a library and of the interpreter links.
         self.put_deb("debian", "libc6", architecture, {
             f"lib/{triplet}/libc.so.6": elf(architecture, [interpreter.split("/")[-1]]),
@@ -132,7 +132,7 @@ class Image(unittest.TestCase):
             self.assertEqual(tar.extractfile("etc/ssl/certs/ca-certificates.crt").read(), b"first\nsecond\n")
         self.assertIn("SSL_CERT_FILE=/etc/ssl/certs/ca-certificates.crt", start["Env"])
         self.assertEqual({name for name, member in members.items() if member.isfile()}, {
-            "usr/bin/rrgate", "usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html", interpreter[1:],
+            "usr/bin/rrgate", "usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html", "usr/share/doc/rrgate/third-party.txt", interpreter[1:],
             f"usr/lib/{triplet}/{interpreter.split('/')[-1]}", "etc/passwd", "etc/group", "etc/rrgate/gateway.json", "usr/share/doc/libc6/copyright",
             "usr/share/doc/libssl3/copyright", "usr/share/doc/ca-certificates/copyright", "etc/ssl/certs/ca-certificates.crt", *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
             *(f"var/lib/dpkg/status.d/{name}" for name in ("rrgate", "libc6", "libssl3", "ca-certificates"))})

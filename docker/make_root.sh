@@ -18,11 +18,11 @@ if [ ! -x "$prebuilt/bin/rrgate" ]; then
   cmake --install build/release --prefix "$prebuilt" --strip
 fi
 
-mkdir -p "$root/usr/libexec" "$root/usr/share" "$root/etc/rrgate" "$root/tmp"
+mkdir -p "$root/usr/libexec" "$root/etc/rrgate" "$root/tmp"
 chmod 1777 "$root/tmp"
 install -D "$prebuilt/bin/rrgate" "$root/usr/bin/rrgate"
 cp -r "$prebuilt/libexec/rrgate" "$root/usr/libexec/rrgate"
-cp -r "$prebuilt/share/rrgate" "$root/usr/share/rrgate"
+cp -r "$prebuilt/share" "$root/usr/share"
 cp "$source/docker/gateway.json" "$root/etc/rrgate/gateway.json"
 echo 'rrgate:x:10001:10001::/:/nonexistent' >"$root/etc/passwd"
 echo 'rrgate:x:10001:' >"$root/etc/group"

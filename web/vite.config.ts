@@ -2,12 +2,14 @@
 // `script-src 'self' 'wasm-unsafe-eval'`. `npm run dev` talks to a gateway on RRGATE_URL (default 127.0.0.1:8080).
 import { loadEnv } from "vite";
 import { defineConfig } from "vitest/config";
+import { licences, wasmNotices } from "../cmake/notices.mjs";
 
 const gateway = loadEnv("", ".", "RRGATE_")["RRGATE_URL"] ?? "http://127.0.0.1:8080";
 
 export default defineConfig({
   base: "./",
   cacheDir: "node_modules/.vite",
+  plugins: [licences(wasmNotices)],
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
   build: {
     outDir: "dist",

@@ -5,6 +5,7 @@ import { existsSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from 
 import path from "node:path";
 import { fileURLToPath } from "node:url";
 import { defineConfig } from "vitepress";
+import { licences } from "../../cmake/notices.mjs";
 import { StyleClasses } from "./style_classes.mjs";
 import { makeSidebar } from "./navigation.mjs";
 
@@ -86,7 +87,7 @@ export default defineConfig({
     outline: [2, 3],
     search: { provider: "local" },
   },
-  vite: { build: { assetsInlineLimit: 0 } },
+  vite: { build: { assetsInlineLimit: 0 }, plugins: [licences()] },
   transformHtml: withoutInline,
   buildEnd: () => writeFileSync(path.join(site, "code.css"), styles.css()),
 });

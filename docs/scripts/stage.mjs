@@ -127,21 +127,9 @@ for (const [name, text] of await clientPages(repository)) pages.set(`reference/r
 for (const [name, text] of await cppPages(repository)) pages.set(`reference/cpp/${name}`, text);
 for (const file of shown) pages.set(pageOf(file) ?? showPage(file), shownText(file));
 
-/** The licences of what the site's scripts are made of, which goes with them. */
-function licences() {
-  const packages = JSON.parse(readFileSync(path.join(repository, "docs/package-lock.json"), "utf8")).packages;
-  const shipped = Object.keys(packages).filter((name) => name && (!packages[name].dev || name.endsWith("/vitepress")));
-  return shipped.flatMap((name) => {
-    const folder = path.join(repository, "docs", name);
-    const files = existsSync(folder) ? readdirSync(folder).filter((file) => /^licen[cs]e/i.test(file)) : [];
-    return files.map((file) => `${name} ${packages[name].version}\n\n${readFileSync(path.join(folder, file), "utf8")}`);
-  });
-}
-
 rmSync(target, { recursive: true, force: true });
 await cp(path.join(repository, "docs/images"), path.join(target, "images"), { recursive: true });
 await cp(path.join(repository, "web/public/icon.svg"), path.join(target, "public/icon.svg"));
-await writeFile(path.join(target, "public/licenses.txt"), licences().join("\n\n"));
 for (const [page, text] of pages) {
   const file = path.join(target, page);
   await mkdir(path.dirname(file), { recursive: true });

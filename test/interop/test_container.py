@@ -113,6 +113,8 @@ def built(podman, tmp_path_factory):
         target = prebuilt / folder / program.split("/")[-1]
         subprocess.run(["strip", "-o", target, BUILD / program], check=True)
     shutil.copytree(ROOT / "web" / "dist", prebuilt / "share" / "rrgate" / "web")
+    (prebuilt / "share/doc/rrgate").mkdir(parents=True)
+    shutil.copy(ROOT / "build/third-party.txt", prebuilt / "share/doc/rrgate")
     # The format of Docker: the other one has no health check.
     podman("build", "--format=docker", "--pull=never", "--isolation=chroot", "--network=host", "-t", "rrgate",
            "-f", context / "docker" / "Dockerfile", context, within=300)
@@ -136,6 +138,16 @@ def test_the_image_trusts_the_cas_of_debian(podman, image, tmp_path):
     finally:
         podman("rm", "-f", "cas", fails=True)
     assert len(ssl.create_default_context(cafile=tmp_path / "cas.pem").get_ca_certs()) > 100
+
+
+def test_the_image_has_the_notices_of_what_is_in_it(podman, image, tmp_path):
+    podman("create", "--name=notices", "--network=host", "--cgroups=disabled", image)
+    try:
+        for file, name in (("doc/rrgate/third-party.txt", "libcli11-dev"), ("rrgate/web/licenses.txt", "emscripten")):
+            podman("cp", f"notices:/usr/share/{file}", tmp_path / name)
+            assert re.search(rf"^{name}\n=+\n", (tmp_path / name).read_text(), re.M), file
+    finally:
+        podman("rm", "-f", "notices", fails=True)
 
 
 def test_a_container(podman, image, tmp_path):

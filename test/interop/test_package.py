@@ -94,6 +94,40 @@ def test_nothing_tells_where_it_was_built():
         assert str(ROOT).encode() not in files, deb.name
 
 
+def header_packages():
+    """The Debian packages of the headers that what is shipped was compiled with."""
+    files, is_shipped = set(), False
+    for line in subprocess.run(["ninja", "-C", BUILD, "-t", "deps"], capture_output=True, text=True, check=True, timeout=60).stdout.splitlines():
+        if line and not line.startswith(" "):
+            is_shipped = line.startswith(("core/", "node/", "server/", "examples/demo/"))
+        elif is_shipped and line.strip().startswith("/usr/include/"):
+            files.add(line.strip())
+    assert files
+    # Headers of a Boost that was unpacked beside this machine's are not there.
+    found = subprocess.run(["dpkg-query", "-S", *files], capture_output=True, text=True, check=True, timeout=60).stdout
+    return {line.split(":")[0] for line in found.splitlines()} | {"libboost1.81-dev"}
+
+
+def test_what_is_compiled_in_has_its_notice(tmp_path):
+    # Of these, the shared libraries do the work. GCC's and the kernel's headers ask for no notice.
+    linked = {"libc6-dev", "libjpeg62-turbo-dev", "libqrencode-dev", "libssl-dev", "libstdc++-12-dev", "libusb-1.0-0-dev", "linux-libc-dev",
+              "zlib1g-dev"}
+    compiled_in = json.loads((ROOT / "cmake/compiled_in.json").read_text())
+    assert header_packages() - linked == set(compiled_in["programs"])
+    (deb,) = PACKAGES.glob("rrgate_*_amd64.deb")
+    (client,) = PACKAGES.glob("rrgate-client-*.tgz")
+    subprocess.run(["dpkg-deb", "-x", deb, tmp_path], check=True, timeout=120)
+    subprocess.run(["tar", "-xzf", client, "-C", tmp_path], check=True, timeout=60)
+    share = tmp_path / "usr/share"
+    for file, names in ((share / "doc/rrgate/third-party.txt", compiled_in["programs"]), (share / "rrgate/web/licenses.txt", compiled_in["wasm"]),
+                        (tmp_path / "package/dist/licenses.txt", compiled_in["wasm"]), (share / "rrgate/docs/licenses.txt", ["vue", "vitepress"])):
+        noticed = set(re.findall(r"^(\S+)(?: [0-9.]+)?\n=+$", file.read_text(), re.M))
+        assert set(names) - noticed <= {"libboost1.81-dev"}, file  # which asks for none beside compiled code
+        assert "Permission is hereby granted, free of charge" in file.read_text()
+    named = set(re.findall(r"/(usr/share/\S+\.txt)", (share / "doc/rrgate/copyright").read_text()))
+    assert len(named) == 3 and all((tmp_path / name).is_file() for name in named)
+
+
 def test_what_is_where(root):
     assert root.run("stat", "-c", "%U:%G %a", "/etc/rrgate", "/etc/rrgate/gateway.json", "/var/lib/rrgate",
                     "/var/log/rrgate").stdout.split("\n")[:4] == \
