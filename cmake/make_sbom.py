@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""make_sbom.py --version V --output FILE PACKAGE.deb... IMAGE.tar... package-lock.json...
+"""make_sbom.py --version V --output FILE PACKAGE.deb... PACKAGE.tgz... IMAGE.tar... package-lock.json...
 
 What a release is made of, as SPDX 2.3 in JSON: the packages, the shared libraries that dpkg-shlibdeps found they need, what
-they are compiled with (Depends of rrgate-dev), the Debian packages whose files are in the container images, and the npm packages
-that are in the page or in the documentation, or come with the client.
+they are compiled with (Depends of rrgate-dev), what is compiled into them (compiled_in.json), the Debian packages whose files are
+in the container images, and the npm packages that are in the page or in the documentation, or come with the client.
 Source: https://spdx.github.io/spdx-spec/v2.3/
 """
 import argparse
@@ -15,6 +15,9 @@ import pathlib
 import re
 import subprocess
 import tarfile
+
+
+COMPILED_IN = json.loads(pathlib.Path(__file__).with_name("compiled_in.json").read_text())
 
 
 def output_of(*command):
@@ -32,16 +35,28 @@ def package(name, version, url=None, checksum=None):
     return entry
 
 
+def debian_package(name):
+    """As it is installed here."""
+    try:
+        version = output_of("dpkg-query", "-W", "-f", "${Version}", name)
+    except subprocess.CalledProcessError:  # Boost may be unpacked beside another one
+        version = "unknown"
+    return package(name, version, f"pkg:deb/debian/{name}@{version}")
+
+
 def debian_dependencies(deb):
-    """Name and version, as installed here, of what a package depends on."""
+    """What a package depends on."""
     for each in output_of("dpkg-deb", "-f", deb, "Depends").split(","):
         name = each.split("|")[0].split("(")[0].strip()
         if name and not name.startswith("rrgate"):
-            try:
-                version = output_of("dpkg-query", "-W", "-f", "${Version}", name)
-            except subprocess.CalledProcessError:  # Boost may be unpacked beside another one
-                version = "unknown"
-            yield package(name, version, f"pkg:deb/debian/{name}@{version}")
+            yield debian_package(name)
+
+
+def compiled_in(path):
+    """What the programs, and the core of the page and of the npm package, have in them. What rrgate-dev has, it depends on."""
+    has_programs = path.suffix == ".tar" or path.name.startswith("rrgate_")
+    kinds = ["programs", "wasm"] if has_programs else ["wasm"] if path.suffix == ".tgz" else []
+    return [debian_package(name) for kind in kinds for name in COMPILED_IN[kind]]
 
 
 def image_contents(image):
@@ -83,19 +98,21 @@ def main():
     product["SPDXID"] = "SPDXRef-product"
     packages[product["SPDXID"]] = product
     for path in arguments.inputs:
-        kind, owner = "DEPENDS_ON", product
+        owner = product
         if path.suffix == ".json":
-            needed = npm_dependencies(path)
+            needed = [("DEPENDS_ON", entry) for entry in npm_dependencies(path)]
         else:
             owner = package(path.name, arguments.version, checksum=hashlib.sha256(path.read_bytes()).hexdigest())
             packages[owner["SPDXID"]] = owner
             relations.add((product["SPDXID"], "CONTAINS", owner["SPDXID"]))
-            if path.suffix == ".deb":
-                owner["licenseDeclared"] = "Apache-2.0"
-                needed = debian_dependencies(path)
+            needed = [("STATIC_LINK", entry) for entry in compiled_in(path)]
+            if path.suffix == ".tar":
+                needed += [("CONTAINS", entry) for entry in image_contents(path)]
             else:
-                kind, needed = "CONTAINS", image_contents(path)
-        for entry in needed:
+                owner["licenseDeclared"] = "Apache-2.0"
+            if path.suffix == ".deb":
+                needed += [("DEPENDS_ON", entry) for entry in debian_dependencies(path)]
+        for kind, entry in needed:
             packages[entry["SPDXID"]] = entry
             relations.add((owner["SPDXID"], kind, entry["SPDXID"]))
     made = datetime.datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), datetime.timezone.utc)

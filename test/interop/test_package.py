@@ -1,6 +1,7 @@
 """The Debian package of the gateway, in a fresh Debian 12: installed by apt with what it depends on, run by the user, program and arguments of its unit."""
 import base64
 import gzip
+import hashlib
 import json
 import re
 import resource
@@ -126,6 +127,37 @@ def test_what_is_compiled_in_has_its_notice(tmp_path):
         assert "Permission is hereby granted, free of charge" in file.read_text()
     named = set(re.findall(r"/(usr/share/\S+\.txt)", (share / "doc/rrgate/copyright").read_text()))
     assert len(named) == 3 and all((tmp_path / name).is_file() for name in named)
+
+
+def test_the_bill_of_materials():
+    """SPDX 2.3, chapters 6, 7 and 11: the fields that it must have."""
+    (bill,) = PACKAGES.glob("rrgate-*.spdx.json")
+    bill = json.loads(bill.read_text())
+    assert (bill["spdxVersion"], bill["dataLicense"], bill["SPDXID"]) == ("SPDX-2.3", "CC0-1.0", "SPDXRef-DOCUMENT")
+    assert bill["name"] and re.fullmatch(r"https://[^#\s]+", bill["documentNamespace"])
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", bill["creationInfo"]["created"])
+    assert all(re.match("(Tool|Person|Organization): ", each) for each in bill["creationInfo"]["creators"])
+    packages = {each["SPDXID"]: each for each in bill["packages"]}
+    assert len(packages) == len(bill["packages"])
+    for name, entry in packages.items():
+        assert re.fullmatch(r"SPDXRef-[A-Za-z0-9.-]+", name) and entry["name"] and entry["downloadLocation"] and entry["filesAnalyzed"] is False
+        assert all(reference["referenceLocator"].startswith("pkg:") for reference in entry.get("externalRefs", []))
+        assert entry["versionInfo"] != "unknown" or entry["name"].startswith("libboost"), name
+    related = {}
+    for each in bill["relationships"]:
+        assert {each["spdxElementId"], each["relatedSpdxElement"]} <= {"SPDXRef-DOCUMENT", *packages}
+        related.setdefault((each["spdxElementId"], each["relationshipType"]), set()).add(each["relatedSpdxElement"])
+    assert len(related["SPDXRef-DOCUMENT", "DESCRIBES"]) == 1
+    (product,) = related["SPDXRef-DOCUMENT", "DESCRIBES"]
+    files = {packages[each]["name"]: each for each in related[product, "CONTAINS"]}
+    shipped = [*PACKAGES.glob("*.deb"), *PACKAGES.glob("*.tgz")]
+    assert len(shipped) == 3 and set(files) == {path.name for path in shipped}
+    compiled_in = json.loads((ROOT / "cmake/compiled_in.json").read_text())
+    for path in shipped:
+        assert packages[files[path.name]]["checksums"] == [{"algorithm": "SHA256", "checksumValue": hashlib.sha256(path.read_bytes()).hexdigest()}]
+        expected = {"rrgate-client-0": ["wasm"], "rrgate": ["programs", "wasm"], "rrgate-dev": []}[re.split(r"\.|_", path.name)[0]]
+        inside = {packages[each]["name"] for each in related.get((files[path.name], "STATIC_LINK"), ())}
+        assert inside == {name for kind in expected for name in compiled_in[kind]}, path.name
 
 
 def test_what_is_where(root):
