@@ -160,6 +160,16 @@ def test_the_bill_of_materials():
         assert inside == {name for kind in expected for name in compiled_in[kind]}, path.name
 
 
+def test_what_the_packages_depend_on_is_in_debian(root):
+    """By this Debian's own lists of packages; nothing of it is fetched."""
+    debs = sorted(PACKAGES.glob("*_amd64.deb"))
+    for deb in debs:
+        shutil.copy(deb, root.folder)
+    said = root.run("apt-get", "install", "--simulate", *(f"/{deb.name}" for deb in debs)).stdout
+    installed = set(re.findall(r"^Inst (\S+) ", said, re.M))
+    assert {"rrgate-dev", "libboost1.81-dev", "libssl-dev", "nlohmann-json3-dev"} <= installed, said
+
+
 def test_what_is_where(root):
     assert root.run("stat", "-c", "%U:%G %a", "/etc/rrgate", "/etc/rrgate/gateway.json", "/var/lib/rrgate",
                     "/var/log/rrgate").stdout.split("\n")[:4] == \
