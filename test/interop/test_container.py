@@ -284,6 +284,20 @@ def test_the_dashboard_asks_for_what_there_is(tmp_path):
     assert labels and all(any(f'{name}="{value}"' in each for each in names) for name, value in labels), labels
 
 
+def test_prometheus_takes_the_rules_and_the_dashboards_expressions(tmp_path):
+    """By Debian's promtool: names and labels are looked at above, here it is the language."""
+    promtool = UNPACKED / "usr/bin/promtool"
+    assert promtool.is_file(), f"{promtool} is missing: ./dev test interop brings it"
+    dashboard = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())
+    expressions = [target["expr"] for panel in dashboard["panels"] for target in panel["targets"]]
+    rules = [{"record": f"panel_{number}", "expr": each} for number, each in enumerate(expressions)]
+    (tmp_path / "panels.yaml").write_text(yaml.safe_dump({"groups": [{"name": "dashboard", "rules": rules}]}))
+    for what, file in (("config", DOCKER / "prometheus.yaml"), ("rules", tmp_path / "panels.yaml")):  # the configuration names rules.yaml
+        result = subprocess.run([promtool, "check", what, file], capture_output=True, text=True, timeout=20, check=False)
+        assert result.returncode == 0, result.stdout + result.stderr
+        assert re.search(r"SUCCESS: \d+ rules found", result.stdout), result.stdout
+
+
 def test_the_unit_is_one(tmp_path):
     """As systemd reads it, with a program that is there."""
     need("systemd")
