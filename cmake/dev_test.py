@@ -110,6 +110,11 @@ class Dev(unittest.TestCase):
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
         self.assertEqual(self.called.read_text(), "run --silent build\n")
 
+    def test_in_ci_a_run_has_an_hour(self):
+        script = "set -- help; source ./dev >/dev/null; SECONDS=3600; set -m; sleep 1000 & set +m; wait_in_time $! $HOME/log"
+        self.assertEqual(self.run_script("bash", "-c", script).returncode, 130)  # by the signal
+        self.assertEqual((self.folder / "log").read_text(), "\nnot done after 0 s: ended\n")
+
     def test_a_demo_says_first_what_it_installs_and_keeps_what_failed(self):
         self.put("node", "echo v18.20.4")
         self.put("apt-get", "echo Get:1 something; echo no such host >&2; exit 100")
