@@ -111,7 +111,7 @@ class Dev(unittest.TestCase):
         self.assertEqual(self.called.read_text(), "run --silent build\n")
 
     def test_in_ci_a_run_has_an_hour(self):
-        script = "set -- help; source ./dev >/dev/null; SECONDS=3600; set -m; sleep 1000 & set +m; wait_in_time $! $HOME/log"
+        script = "set -- help; source ./dev >/dev/null; SECONDS=4800; set -m; sleep 1000 & set +m; wait_in_time $! $HOME/log"
         self.assertEqual(self.run_script("bash", "-c", script).returncode, 130)  # by the signal
         self.assertEqual((self.folder / "log").read_text(), "\nnot done after 0 s: ended\n")
 
