@@ -285,6 +285,41 @@ def test_the_unit_starts_again_where_an_address_comes_late_and_not_where_the_con
     assert "listne" in said and status in given_up
 
 
+def test_a_second_signal_ends_what_is_left_at_once(device, tmp_path):
+    with running(tmp_path, {"devices": [interop(device)], "timeouts": {"drain_ms": 600_000}}) as gateway:
+        link = gateway.session()
+        gateway.process.process.send_signal(signal.SIGTERM)
+        gateway.wait_for("stopping")
+        assert is_alive(link)
+        gateway.process.process.send_signal(signal.SIGTERM)
+        assert gateway.process.process.wait(10) == 0
+        assert not is_alive(link)
+        link.close()
+
+
+def test_the_log_has_what_its_level_asks_for(tmp_path):
+    class Quiet(Gateway):
+        def wait_until_ready(self):
+            self.process.wait_until(lambda: "online" not in self.state())
+
+        def state(self):
+            try:
+                return fetch(self.port, "/api/v1/devices")[2].decode()
+            except OSError:
+                return "online"  # not known yet
+
+    away = {"name": "away", "url": "rr+tcp://127.0.0.1:1/?service=none"}
+    levels = {}
+    for level in ("info", "warning", "error"):
+        (tmp_path / level).mkdir()
+        gateway = Quiet(tmp_path / level, {"devices": [away], "log": {"format": "json", "level": level}})
+        gateway.process.wait_until(lambda: '"offline"' in gateway.state())
+        assert gateway.process.stop() == 0
+        levels[level] = {event["level"] for event in gateway.events()}
+    assert levels["info"] >= {"info", "warning"} and "debug" not in levels["info"]
+    assert levels["warning"] == {"warning"} and levels["error"] == set()
+
+
 def test_a_ca_that_is_not_there_is_said_with_the_device_that_it_is_for(tmp_path):
     device = {"name": "arm", "url": "rrs+tcp://127.0.0.1:1/?service=arm", "tls": {"ca": [str(tmp_path / "none.pem")]}}
     (tmp_path / "gateway.json").write_text(json.dumps({"listen": ["127.0.0.1:0"], "devices": [device]}))
