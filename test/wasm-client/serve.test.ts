@@ -1,6 +1,7 @@
 // serve(): a page as a device, with a gateway that is not one. Through a real one: test/interop/test_page_device.py.
 import { readFileSync } from "node:fs";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import type { ObjectInfo } from "../../wasm-client/dist/node.js";
 import { serve, type ServedDevice, type ServeOptions } from "../../wasm-client/dist/serve/node.js";
 import { ServedEndpoint, ServedPipe } from "../../wasm-client/ts/serve/served_object.js";
 import { FakeGateway, type PageSocket } from "./fake_gateway.js";
@@ -32,6 +33,7 @@ object Lamp
 end`;
 
 interface Lamp {
+  $: ObjectInfo;
   level: { get(): Promise<number>; set(value: number): Promise<void> };
 }
 interface Phone {
@@ -77,7 +79,7 @@ const implementation = () => ({
   samples: new Float64Array([1, 2, 3, 4]),
   grid: { dims: [3, 2], data: new Int16Array([1, 2, 3, 4, 5, 6]) },
   askMe: (question: string) => device.caller!.call(device.root, "ask", question),
-  lamps: { left: { level: 1 }, right: { level: 2 } },
+  lamps: { left: { level: 1 }, right: { level: 2 }, ["a/b"]: { level: 3 } } as Record<string, { level: number }>,
   thing: () => {
     device.emit("tapped", 1, 2);
     return { rrType: "test.phone.Lamp", level: 7 };
@@ -101,6 +103,8 @@ beforeEach(async () => {
   device = await begin();
 });
 afterEach(() => device.close());
+
+const textOf = (bytes: string | ArrayBuffer | Uint8Array) => Buffer.from(bytes as Uint8Array).toString("latin1");
 
 const failure = (promise: Promise<unknown>) =>
   promise.then(
@@ -137,6 +141,43 @@ it("hands on what was thrown, and what is wrong with an answer", async () => {
   expect((await failure(phone.broken.get())).message).toContain("broken");
   report.mockRestore();
   expect(reported).toHaveLength(1); // whoever wrote it sees it, too
+  await phone.$.close();
+});
+
+it("releases all objects behind an objref, or that of one index", async () => {
+  await device.close();
+  const object = implementation();
+  device = await begin({ object });
+  const phone = await gateway.connect<Phone>();
+  const level = async (index: string) => (await phone.lamps.get(index)).level.get();
+  const held = await phone.lamps.get("left");
+  expect([await held.level.get(), await level("right")]).toEqual([1, 2]);
+  object.lamps = { left: { level: 5 }, right: { level: 6 } };
+  device.root.release("lamps", "left");
+  await vi.waitFor(() => expect(held.$.state).toBe("released"));
+  expect([await level("left"), await level("right")]).toEqual([5, 2]);
+  object.lamps = { left: { level: 7 }, right: { level: 8 } };
+  device.root.release("lamps");
+  await vi.waitFor(async () => expect([await level("left"), await level("right")]).toEqual([7, 8]));
+  const later = await gateway.connect<Phone>();
+  expect(await (await later.lamps.get("left")).level.get()).toBe(7);
+  expect(() => device.root.release("thing", "left")).toThrow(/"thing" has no index/);
+  for (const each of [phone, later]) await each.$.close();
+});
+
+it("releases an object as its clients spell it", async () => {
+  const told: string[] = [];
+  const phone = await gateway.connect<Phone>((socket) => {
+    const tell = socket.tell.bind(socket);
+    socket.tell = (data) => tell(Uint8Array.from(Buffer.from(textOf(data).replaceAll("%2f", "%2F"), "latin1")).buffer);
+    socket.send = new Proxy(socket.send, {
+      apply: (send, self, [data]: [Uint8Array]) => (told.push(textOf(data)), send.call(self, data)),
+    });
+  });
+  await (await phone.lamps.get("a/b")).level.get();
+  told.length = 0;
+  device.root.release("lamps", "a/b");
+  expect(told.join()).toMatch(/Phone\.lamps\[a%2Fb]/);
   await phone.$.close();
 });
 

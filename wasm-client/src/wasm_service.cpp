@@ -291,10 +291,9 @@ JsValue WasmService::call_callback(std::uint32_t number, const JsValue& path, co
 }
 
 void WasmService::release(const JsValue& path) {
-  const auto at = text_of(path);
-  service_->forget_path(at);
-  for (const auto& [number, client] : clients_)
-    if (client.session->service() == service_.get()) client.session->release_path(at, now_);
+  for (const auto& spelling : service_->forget_path(text_of(path)))
+    for (const auto& [number, client] : clients_)
+      if (client.session->service() == service_.get()) client.session->release_path(spelling, now_);
 }
 
 void WasmService::close_service() {

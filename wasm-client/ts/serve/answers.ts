@@ -107,9 +107,7 @@ export function takeOutValue(object: ServedObject, wire: string, value: RrValue)
 
 /** The implementation of the object behind an objref. */
 export function childOf(object: ServedObject, member: string, index: string | undefined): Implementation {
-  const { type } = object.members.get(member) as MemberInfo;
-  const isNumbered = type.endsWith("[]") || type.endsWith("{int32}");
-  const key = isNumbered ? Number(index) : index;
+  const key = keyOf(object, member, index);
   const given = object.implementation[member];
   let child = given;
   if (typeof given === "function") child = (given as (key: unknown) => unknown).call(object.implementation, key);
@@ -121,6 +119,12 @@ export function childOf(object: ServedObject, member: string, index: string | un
   if (child instanceof Promise)
     throw makeError("InvalidOperation", `objref "${member}" is async: its objects have to be there`);
   throw makeError("ObjectNotFound", `there is no object ${member}${index === undefined ? "" : `[${index}]`}`);
+}
+
+/** What the objects behind an objref are told apart by; undefined where it has no index. */
+export function keyOf(object: ServedObject, objref: string, index: string | undefined): string | number | undefined {
+  const { type } = object.members.get(objref) as MemberInfo;
+  return type.endsWith("[]") || type.endsWith("{int32}") ? Number(index) : index;
 }
 
 /** Only what has the functions as its own: a Map and a TypedArray are values. */

@@ -14,7 +14,7 @@ export interface ServiceOfObject {
   sendPipe(endpoint: ServedEndpoint, value: unknown): Promise<void>;
   closePipe(endpoint: ServedEndpoint): void;
   callBack(client: number, object: ServedObject, callback: string, args: readonly unknown[]): Promise<RrValue>;
-  release(path: string): void;
+  release(parent: ServedObject, objref: string, index: string | number | undefined): void;
 }
 
 /** The members of an implementation, by their names. */
@@ -57,14 +57,20 @@ export class ServedObject {
     return pipe;
   }
 
-  /** The objects behind an objref, or behind one index of it, are others from now on: clients look them up again. */
-  release(objref: string): void {
-    this.#check(objref, "objref");
-    this.service.release(`${this.path}.${objref}`);
+  /**
+   * The objects behind an objref, or the one behind an index of it, are others from now on: clients look them up again.
+   * @throws RobotRaconteurError MemberNotFound; InvalidArgument: an index of an objref that has none
+   */
+  release(objref: string, index?: string | number): void {
+    const { type } = this.#check(objref, "objref");
+    if (index !== undefined && !/[\]}]$/.test(type))
+      throw makeError("InvalidArgument", `${this.type}: objref "${objref}" has no index`);
+    this.service.release(this, objref, index);
   }
 
-  #check(name: string, kind: MemberInfo["kind"]): void {
-    if (this.members.get(name)?.kind === kind) return;
+  #check(name: string, kind: MemberInfo["kind"]): MemberInfo {
+    const member = this.members.get(name);
+    if (member?.kind === kind) return member;
     throw makeError("MemberNotFound", `${this.type} has no ${kind} "${name}"`);
   }
 }

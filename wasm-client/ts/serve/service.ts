@@ -5,16 +5,25 @@ import { lookTimer, roomMark, transmitMark } from "../outflow.js";
 import type { LookTimer } from "../outflow.js";
 import type { Transport } from "../transport.js";
 import type { MemberInfo, RrValue } from "../types.js";
-import { Answers, childOf, takeOutValue } from "./answers.js";
+import { Answers, childOf, keyOf, takeOutValue } from "./answers.js";
 import { Caller, ServedEndpoint, ServedObject } from "./served_object.js";
 import type { Implementation, ServiceOfObject } from "./served_object.js";
 import { ServiceCore } from "./service_module.js";
 import type { ServiceCall, ServiceEvent, ServiceOptions } from "./service_module.js";
 
+/** An object that was found behind an objref. */
+interface Found {
+  readonly object: ServedObject;
+  readonly parentPath: string;
+  readonly objref: string;
+  readonly key: string | number | undefined;
+}
+
 export class Service implements ServiceOfObject {
   #core!: ServiceCore;
   #root!: ServedObject;
-  readonly #objects = new Map<string, ServedObject>();
+  /** By their paths. */
+  readonly #found = new Map<string, Found>();
   readonly #clients = new Map<number, ServedClient>();
   #caller: Caller | undefined;
   #isLooking = false;
@@ -100,10 +109,16 @@ export class Service implements ServiceOfObject {
     });
   }
 
-  release(path: string): void {
-    for (const known of this.#objects.keys())
-      if (known === path || known.startsWith(`${path}.`) || known.startsWith(`${path}[`)) this.#objects.delete(known);
-    this.#free.release(path);
+  release(parent: ServedObject, objref: string, index?: string | number): void {
+    const core = this.#free;
+    const key = index === undefined ? undefined : keyOf(parent, objref, String(index));
+    for (const [path, found] of this.#found) {
+      if (found.parentPath !== parent.path || found.objref !== objref) continue;
+      if (key !== undefined && found.key !== key) continue;
+      for (const known of this.#found.keys())
+        if (known === path || known.startsWith(`${path}.`)) this.#found.delete(known);
+      core.release(path);
+    }
     this.#pump();
   }
 
@@ -133,14 +148,15 @@ export class Service implements ServiceOfObject {
     } finally {
       this.#isLooking = false;
     }
-    const known = this.#objects.get(path);
+    const known = this.#found.get(path)?.object;
     if (known?.implementation === implementation) return known;
     // Where the definition leaves it open, or to say that it is more than that.
     const { rrType } = implementation;
     const own = typeof rrType === "string" ? rrType : type;
     const members = new Map(this.#core.members(own).map((each) => [each.name, each]));
     const object = new ServedObject(this, path, own, implementation, members);
-    this.#objects.set(path, object);
+    const key = keyOf(parent, member, index);
+    this.#found.set(path, { object, parentPath: parent.path, objref: member, key });
     return object;
   }
 
