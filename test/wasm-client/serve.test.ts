@@ -246,6 +246,28 @@ it.each([
   expect([first, left.length]).toEqual(size > 1 ? [5, count - 1] : [4, count]);
 });
 
+it("lets the next client in when the one who has an object to itself leaves, or is gone", async () => {
+  const phones = await Promise.all([1, 2, 3].map(() => gateway.connect<Phone>()));
+  const entered: number[] = [];
+  const leave: (() => void)[] = [];
+  const turns: Promise<void>[] = [];
+  const enter = async (i: number) => {
+    const stay = () => (entered.push(i), new Promise<void>((resolve) => leave.push(resolve)));
+    turns.push(phones[i]!.$.monitor(stay));
+    await phones[i]!.note.get().catch(() => undefined); // its request is there
+  };
+  for (const i of [0, 1, 2]) await enter(i);
+  expect(entered).toEqual([0]);
+  leave[0]!();
+  await vi.waitFor(() => expect(entered).toEqual([0, 1]));
+  const settled = Promise.allSettled(turns);
+  void phones[1]!.$.close();
+  await vi.waitFor(() => expect(entered).toEqual([0, 1, 2]));
+  for (const each of leave) each();
+  expect((await settled).map(({ status }) => status)).toEqual(["fulfilled", "rejected", "fulfilled"]);
+  for (const phone of phones) await phone.$.close();
+});
+
 it("answers calls back and gives events to all", async () => {
   const both = await Promise.all([gateway.connect<Phone>(), gateway.connect<Phone>()]);
   const heard = both.map((phone) => new Promise((resolve) => phone.tapped.on((x, y) => resolve([x, y]))));

@@ -367,12 +367,11 @@ JsValue WasmService::event_to_js(Client& client, ServiceEvent& event) {
                                  now_);
     return JsValue::undefined();
   }
+  JsWriter js;
   if (std::holds_alternative<LocksChanged>(event)) {
     for (const auto& [number, each] : clients_) each.session->handle_locks_changed(now_);
-    return JsValue::undefined();
-  }
-  JsWriter js;
-  if (const auto* wire = std::get_if<WireConnected>(&event)) {
+    begin_event(js, "locks_changed");
+  } else if (const auto* wire = std::get_if<WireConnected>(&event)) {
     begin_member_event(js, "wire_connected", wire->object, *wire->member);
   } else if (const auto* received = std::get_if<WireReceived>(&event)) {
     begin_member_event(js, "wire", received->object, *received->member);

@@ -72,19 +72,19 @@ export class Service implements ServiceOfObject {
   /** Tells all clients that the service ends. */
   close(): void {
     this.#free.closeService();
-    this.#pump();
+    this.pump();
   }
 
   // --- asked by objects ---
 
   emit(object: ServedObject, event: string, args: readonly unknown[]): void {
     this.#free.sendEvent(object, event, args);
-    this.#pump();
+    this.pump();
   }
 
   setWire(object: ServedObject, wire: string, value: unknown): void {
     this.#free.sendWire(0, object, wire, value);
-    this.#pump();
+    this.pump();
   }
 
   async sendPipe(endpoint: ServedEndpoint, value: unknown): Promise<void> {
@@ -119,7 +119,7 @@ export class Service implements ServiceOfObject {
         if (known === path || known.startsWith(`${path}.`)) this.#found.delete(known);
       core.release(path);
     }
-    this.#pump();
+    this.pump();
   }
 
   // --- asked by clients ---
@@ -160,7 +160,8 @@ export class Service implements ServiceOfObject {
     return object;
   }
 
-  #pump(): void {
+  /** Asks all clients for what there is to send and to do. */
+  pump(): void {
     for (const client of [...this.#clients.values()]) client.pump();
   }
 }
@@ -289,6 +290,9 @@ class ServedClient {
         else pending?.resolve(event.value ?? null);
         break;
       }
+      case "locks_changed":
+        this.service.pump();
+        break;
       case "gone":
         this.#finish();
         break;

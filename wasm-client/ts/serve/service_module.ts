@@ -61,6 +61,8 @@ export type ServiceEvent =
   | { kind: "pipe_closed"; id: number }
   | { kind: "generator_ended"; id: number }
   | { kind: "callback"; id: number; value?: RrValue; error?: ErrorFields }
+  /** What others of the clients waited for may be theirs now. */
+  | { kind: "locks_changed" }
   | { kind: "gone" };
 
 /** What stands behind an objref. */
