@@ -2,6 +2,7 @@
 import { readFileSync } from "node:fs";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { ObjectInfo } from "../../wasm-client/dist/node.js";
+import { platform } from "../../wasm-client/dist/internal.js";
 import { serve, type ServedDevice, type ServeOptions } from "../../wasm-client/dist/serve/node.js";
 import { ServedEndpoint, ServedPipe } from "../../wasm-client/ts/serve/served_object.js";
 import { FakeGateway, type PageSocket } from "./fake_gateway.js";
@@ -88,15 +89,15 @@ const implementation = () => ({
 let implementationLevel = 0;
 let ended = 0;
 
-const begin = (more: Partial<ServeOptions> = {}) =>
-  serve({
-    url: "ws://gateway/below",
-    name: "phone",
-    definition,
-    type: "test.phone.Phone",
-    object: implementation(),
-    ...more,
-  });
+const settings = (more: Partial<ServeOptions>): ServeOptions => ({
+  url: "ws://gateway/below",
+  name: "phone",
+  definition,
+  type: "test.phone.Phone",
+  object: implementation(),
+  ...more,
+});
+const begin = (more: Partial<ServeOptions> = {}) => serve(settings(more));
 
 beforeEach(async () => {
   gateway = new FakeGateway();
@@ -309,6 +310,60 @@ it("rejects with what the gateway says", async () => {
   expect(error.message).toContain("there is a device 'phone' already");
   gateway.answer = () => undefined;
   expect((await failure(begin({ timeout: 20 }))).code).toBe(ErrorCode.RequestTimeout);
+});
+
+describe.each(["the function that gives the URL", "ws://gateway/below/serve/phone"])("waits for %s", (where) => {
+  let url: () => string | Promise<string>;
+  /** From now on there is no URL, or no ticket for it. */
+  const hang = (asked: () => void) => {
+    const never = () => (asked(), new Promise<never>(() => undefined));
+    if (where.startsWith("ws:")) platform.findWebsocket = never;
+    else url = never;
+  };
+  beforeEach(() => (url = () => "ws://gateway/below"));
+
+  it("until the timeout", async () => {
+    hang(() => undefined);
+    const error = await failure(begin({ url: () => url(), timeout: 20 }));
+    expect(error).toMatchObject({ code: ErrorCode.RequestTimeout, message: `${where}: no answer within 20 ms` });
+  });
+
+  it("until it is aborted", async () => {
+    const giving = new AbortController();
+    const reason = new Error("the page has changed its mind");
+    hang(() => queueMicrotask(() => giving.abort(reason)));
+    expect(await failure(begin({ url: () => url(), signal: giving.signal }))).toBe(reason);
+  });
+
+  it("until the next attempt, where the connection was lost", async () => {
+    await device.close();
+    const news: string[] = [];
+    const options = settings({ url: () => url(), onChange: (_, reason) => void news.push(reason) });
+    device = await serve(options);
+    const { findWebsocket } = platform;
+    options.timeout = 20;
+    hang(() => {
+      url = () => "ws://gateway/below";
+      platform.findWebsocket = findWebsocket;
+      options.timeout = undefined;
+    });
+    gateway.control.end(1001, "gone");
+    await vi.waitFor(() => expect(device.isServed).toBe(true), 5_000);
+    expect(news).toEqual(["", "gone", `${where}: no answer within 20 ms`, ""]);
+  });
+});
+
+it("opens no connection for a URL that comes too late", async () => {
+  let give!: (url: string) => void;
+  const giving = new AbortController();
+  const url = () => new Promise<string>((resolve) => (give = resolve));
+  const beginning = failure(begin({ url, signal: giving.signal }));
+  await vi.waitFor(() => expect(give).toBeDefined());
+  const count = gateway.controls.length;
+  giving.abort();
+  give("ws://gateway/below");
+  expect(await beginning).toBe(giving.signal.reason);
+  expect(gateway.controls).toHaveLength(count);
 });
 
 it("rejects definitions that are wrong, and what is no object of them", async () => {

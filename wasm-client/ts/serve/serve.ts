@@ -9,7 +9,7 @@ import type { Proof } from "../platform.js";
 import type { Transport } from "../transport.js";
 import { parseServiceUrl } from "../url.js";
 import { openWebsocket } from "../websocket.js";
-import { after } from "../within.js";
+import { after, within } from "../within.js";
 import type { Caller, Implementation, ServedObject } from "./served_object.js";
 import { Service } from "./service.js";
 
@@ -31,7 +31,7 @@ export interface ServeOptions extends Proof {
   service?: string | undefined;
   /** The node's UUID; another one for each call of serve(). */
   nodeId?: string | undefined;
-  /** Milliseconds until the gateway has taken the device, and for each later attempt; 30,000. */
+  /** Milliseconds until the gateway has taken the device, from the call of `url` on, and for each later attempt; 30,000. */
   timeout?: number | undefined;
   /** Gives up. Once the page is a device it has no effect; use close(). */
   signal?: AbortSignal | undefined;
@@ -91,6 +91,8 @@ class Device implements ServedDevice {
   readonly name: string;
   #isServed = false;
   #isClosed = false;
+  /** Of the newest attempt. */
+  #ending: AbortController | undefined;
   #socket: WebSocket | undefined;
   #wait: ReturnType<typeof setTimeout> | undefined;
   readonly #backoff = new Backoff(firstWaitMs, longestWaitMs, Math.random);
@@ -134,6 +136,7 @@ class Device implements ServedDevice {
       this.#isClosed = true;
       this.#isServed = false;
       clearTimeout(this.#wait);
+      this.#ending?.abort(makeError("OperationCancelled", "the device was closed"));
       this.service.close();
       this.#socket?.close(1000);
     }
@@ -147,36 +150,44 @@ class Device implements ServedDevice {
   /** Resolves once the gateway has taken the device. */
   async #attempt(signal?: AbortSignal): Promise<void> {
     const { url: source, name, timeout = defaultTimeoutMs } = this.options;
-    const given = typeof source === "function" ? await source() : source;
-    const url = serveUrl(given, name);
-    const where = `${url.protocol}//${url.host}${url.pathname}`;
-    const SocketClass = await platform.findWebsocket(url, this.options);
-    if (this.#isClosed) throw makeError("OperationCancelled", "the device was closed");
-    const socket = new SocketClass(url.href, [subprotocol]);
-    this.#socket = socket;
-    await new Promise<void>((resolve, reject) => {
-      const fail = (error: unknown) => {
-        reject(error);
-        socket.close();
-      };
-      const timer = after(timeout, () => fail(makeError("RequestTimeout", `${where}: no answer within ${timeout} ms`)));
-      const abort = () => fail(signal?.reason);
-      signal?.addEventListener("abort", abort, { once: true });
-      const settled = () => {
-        clearTimeout(timer);
-        signal?.removeEventListener("abort", abort);
-      };
+    const ending = (this.#ending = new AbortController());
+    const unlessEnded = <T>(step: Promise<T>) => within(step, { signal: ending.signal }, "");
+    let where = "the function that gives the URL";
+    let socket: WebSocket | undefined;
+    const abort = () => ending.abort(signal?.reason);
+    signal?.addEventListener("abort", abort, { once: true });
+    const timer = after(timeout, () =>
+      ending.abort(makeError("RequestTimeout", `${where}: no answer within ${timeout} ms`)),
+    );
+    try {
+      const given = typeof source === "function" ? await unlessEnded(Promise.resolve().then(source)) : source;
+      const url = serveUrl(given, name);
+      where = `${url.protocol}//${url.host}${url.pathname}`;
+      const SocketClass = await unlessEnded(platform.findWebsocket(url, this.options));
+      socket = new SocketClass(url.href, [subprotocol]);
+      this.#socket = socket;
+      await unlessEnded(this.#taken(socket, url, where));
+    } catch (error) {
+      socket?.close();
+      throw error;
+    } finally {
+      clearTimeout(timer);
+      signal?.removeEventListener("abort", abort);
+    }
+  }
+
+  /** Resolves when the gateway says by `socket` that it has the device, and follows what it says later. */
+  #taken(socket: WebSocket, url: URL, where: string): Promise<void> {
+    return new Promise<void>((resolve, reject) => {
       socket.addEventListener("message", ({ data }: MessageEvent) => {
         const message = JSON.parse(String(data)) as { served?: string; open?: string };
         if (message.open !== undefined) void this.#open(url, message.open);
         if (message.served === undefined) return;
-        settled();
         this.#backoff.reset();
         this.#change(true, "");
         resolve();
       });
       socket.addEventListener("close", ({ reason, code }: CloseEvent) => {
-        settled();
         const why = reason || `could not connect, or was closed (WebSocket code ${code})`;
         const wasServed = this.#isServed && this.#socket === socket;
         if (wasServed) this.#lost(why);
