@@ -191,6 +191,26 @@ it("does nothing else while an object is looked for", async () => {
   await phone.$.close();
 });
 
+it("ends a generator whose client is gone before there is one", async () => {
+  await device.close();
+  const events: string[] = [];
+  let give!: (steps: unknown) => void;
+  const count = () => (events.push("asked"), new Promise((resolve) => (give = resolve)));
+  let socket!: PageSocket;
+  device = await begin({ object: { ...implementation(), count } });
+  const phone = await gateway.connect<Phone>((made) => (socket = made));
+  const step = failure(phone.count(5).next());
+  await vi.waitFor(() => expect(events).toEqual(["asked"]));
+  socket.end(1006, "");
+  give({
+    next: () => events.push("next"),
+    return: () => (events.push("ended"), { done: true, value: undefined }),
+  });
+  await vi.waitFor(() => expect(events).toEqual(["asked", "ended"]));
+  await phone.$.close();
+  await step;
+});
+
 it("ends the generators of a client that goes", async () => {
   ended = 0;
   const phone = await gateway.connect<Phone>();

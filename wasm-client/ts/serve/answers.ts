@@ -11,7 +11,8 @@ type Steps = Iterator<unknown> | AsyncIterator<unknown>;
 
 /** A generator that a client runs. */
 interface Run {
-  steps: Steps;
+  /** Not there yet while an async function makes them. */
+  steps?: Steps;
   /** What its steps bring, where the function takes that. */
   values: ValueQueue<RrValue> | undefined;
 }
@@ -67,10 +68,7 @@ export class Answers {
     const run = this.#runs.get(generator);
     if (!run || !this.#runs.delete(generator)) return;
     run.values?.end();
-    // It may be in the middle of a step: it ends behind that, and nobody waits for it.
-    const { steps } = run;
-    const ending = async () => (reason !== undefined && steps.throw ? steps.throw(reason) : steps.return?.());
-    ending().catch(() => undefined);
+    if (run.steps) leave(run.steps, reason);
   }
 
   /** The client is gone. */
@@ -82,13 +80,21 @@ export class Answers {
     const takesValues = object.members.get(member)?.parameters.at(-1)?.type.endsWith(generatorSuffix) ?? false;
     const values = takesValues ? new ValueQueue<RrValue>(Infinity, () => undefined) : undefined;
     const iterable = values && { [Symbol.asyncIterator]: () => values };
-    const made = await functionOf(object, member)(...args, ...(iterable ? [iterable] : []));
-    this.#runs.set(generator, { steps: stepsOf(made, member), values });
+    const run: Run = { values };
+    this.#runs.set(generator, run);
+    try {
+      const made = await functionOf(object, member)(...args, ...(iterable ? [iterable] : []));
+      run.steps = stepsOf(made, member);
+    } catch (error) {
+      this.#runs.delete(generator);
+      throw error;
+    }
+    if (!this.#runs.has(generator)) leave(run.steps); // the client has gone meanwhile
   }
 
   async #next({ generator, value }: ServiceCall): Promise<unknown> {
     const run = this.#runs.get(generator);
-    if (!run) throw makeError("InvalidOperation", "the generator has ended");
+    if (!run?.steps) throw makeError("InvalidOperation", "the generator has ended");
     run.values?.push(value);
     const step = await run.steps.next();
     if (!this.#runs.has(generator)) throw makeError("OperationAborted", "the generator was ended");
@@ -164,6 +170,12 @@ function memoryOf({ implementation }: ServedObject, name: string): Memory {
 function valueOf(values: ReadonlyMap<string, unknown>, wire: string): unknown {
   if (!values.has(wire)) throw makeError("ValueNotSet", `wire "${wire}" has no value yet`);
   return values.get(wire);
+}
+
+/** It may be in the middle of a step: it ends behind that, and nobody waits for it. */
+function leave(steps: Steps, reason?: unknown): void {
+  const ending = async () => (reason !== undefined && steps.throw ? steps.throw(reason) : steps.return?.());
+  ending().catch(() => undefined);
 }
 
 function stepsOf(made: unknown, name: string): Steps {
