@@ -303,6 +303,19 @@ it("answers calls back and gives events to all", async () => {
   for (const phone of both) await phone.$.close();
 });
 
+it("may be closed by what finds an object", async () => {
+  await device.close();
+  let closing: Promise<void> | undefined;
+  const lamps = () => ((closing = device.close()), { level: 1 });
+  device = await begin({ object: { ...implementation(), lamps } });
+  const phone = await gateway.connect<Phone>();
+  const ended = new Promise((resolve) => phone.$.onClose(resolve));
+  void failure(phone.lamps.get("left")).catch(() => undefined);
+  expect(await ended).toMatchObject({ message: expect.stringContaining("the service was closed") as string });
+  await closing;
+  expect([device.isServed, gateway.control.isClosed]).toEqual([false, true]);
+});
+
 it("comes back when the connection is lost, and not when it is closed", async () => {
   const news: [boolean, string][] = [];
   await device.close();

@@ -90,7 +90,7 @@ export async function serve(options: ServeOptions): Promise<ServedDevice> {
 class Device implements ServedDevice {
   readonly name: string;
   #isServed = false;
-  #isClosed = false;
+  #closed: Promise<void> | undefined;
   /** Of the newest attempt. */
   #ending: AbortController | undefined;
   #socket: WebSocket | undefined;
@@ -132,19 +132,20 @@ class Device implements ServedDevice {
   }
 
   close(): Promise<void> {
-    if (!this.#isClosed) {
-      this.#isClosed = true;
-      this.#isServed = false;
-      clearTimeout(this.#wait);
-      this.#ending?.abort(makeError("OperationCancelled", "the device was closed"));
-      this.service.close();
-      this.#socket?.close(1000);
-    }
-    return Promise.resolve();
+    return (this.#closed ??= this.#end());
   }
 
   [Symbol.asyncDispose](): Promise<void> {
     return this.close();
+  }
+
+  async #end(): Promise<void> {
+    this.#isServed = false;
+    clearTimeout(this.#wait);
+    this.#ending?.abort(makeError("OperationCancelled", "the device was closed"));
+    await Promise.resolve(); // what finds an object may close the device: its core is free behind that
+    this.service.close();
+    this.#socket?.close(1000);
   }
 
   /** Resolves once the gateway has taken the device. */
@@ -209,7 +210,7 @@ class Device implements ServedDevice {
     let isOpen = false;
     const begin = () => {
       if (!transport || !isOpen || client) return;
-      if (this.#isClosed) return transport.close();
+      if (this.#closed) return transport.close();
       client = this.service.add(transport, deviceUrl);
       for (const bytes of early.splice(0)) client.received(bytes);
     };
@@ -232,10 +233,10 @@ class Device implements ServedDevice {
   }
 
   #tryLater(): void {
-    if (this.#isClosed) return;
+    if (this.#closed) return;
     this.#wait = setTimeout(() => {
       this.#attempt().catch((error: unknown) => {
-        if (this.#isClosed) return;
+        if (this.#closed) return;
         callSafely(() => this.options.onChange?.(false, textOf(error)));
         this.#tryLater();
       });
@@ -243,7 +244,7 @@ class Device implements ServedDevice {
   }
 
   #change(isServed: boolean, reason: string): void {
-    if (this.#isClosed || this.#isServed === isServed) return;
+    if (this.#closed || this.#isServed === isServed) return;
     this.#isServed = isServed;
     callSafely(() => this.options.onChange?.(isServed, reason));
   }
