@@ -1,6 +1,7 @@
 // The right to command an object, held for as long as this page is alive and looked at. Layer: wasm-client/ts.
 // Renewed by a timer of this thread: a page that is frozen, hidden, offline or gone renews nothing, and the gateway makes
 // the device safe.
+import { asyncDispose } from "../dispose.js";
 import { callSafely, ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
 import { Info } from "../object.js";
 import type { Session } from "../session.js";
@@ -144,7 +145,7 @@ class HeldLease implements Lease {
     await this.ask(Command.release); // of one that was lost, too: until then its commands are refused
   }
 
-  [Symbol.asyncDispose](): Promise<void> {
+  [asyncDispose](): Promise<void> {
     return this.release();
   }
 

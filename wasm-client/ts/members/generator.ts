@@ -1,5 +1,6 @@
 // Generator functions: results that come one after another. Layer: wasm-client/ts/members.
 // Source: sessions spec section 2.10.
+import { asyncDispose } from "../dispose.js";
 import { ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
 import type { CallOptions, MemberInfo, RrValue } from "../types.js";
 import type { GeneratorStep } from "../wasm_module.js";
@@ -79,7 +80,7 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
     throw error;
   }
 
-  async [Symbol.asyncDispose](): Promise<void> {
+  async [asyncDispose](): Promise<void> {
     await this.return();
   }
 

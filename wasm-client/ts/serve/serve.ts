@@ -3,6 +3,7 @@
  * @module
  */
 import { Backoff } from "../clock.js";
+import { asyncDispose } from "../dispose.js";
 import { callSafely, makeError, textOf } from "../errors.js";
 import { platform } from "../platform.js";
 import type { Proof } from "../platform.js";
@@ -135,7 +136,7 @@ class Device implements ServedDevice {
     return (this.#closed ??= this.#end());
   }
 
-  [Symbol.asyncDispose](): Promise<void> {
+  [asyncDispose](): Promise<void> {
     return this.close();
   }
 
