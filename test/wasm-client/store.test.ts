@@ -1,5 +1,6 @@
 // Subscriptions as pages hold them: their state, values and events over connections, and the end of all that is held.
 import type { Client, OpenTransport, RemoteObject, RrValue, SubscriptionState } from "../../wasm-client/dist/node.js";
+import { ValueStore } from "../../wasm-client/ts/store.js";
 import { settle, subscribe, TestService } from "./service.js";
 
 const definition = `service test.store
@@ -68,6 +69,43 @@ it("gives a loop the newest state, until it is closed", async () => {
     if (status === "connected") void subscription.close();
   }
   expect(seen).toEqual(["connecting", "connected", "closed"]);
+});
+
+it("leaves nobody with an older value where a listener sets another one", async () => {
+  const store = new ValueStore(0);
+  const first: number[] = [];
+  const second: number[] = [];
+  store.subscribe((value) => {
+    first.push(value);
+    if (value === 1) store.set(2);
+  });
+  store.subscribe((value) => void second.push(value));
+  const loop = store[Symbol.asyncIterator]();
+  await loop.next();
+  store.set(1);
+  store.set(Number.NaN);
+  expect([first, second]).toEqual([
+    [0, 1, 2, Number.NaN],
+    [0, 2, Number.NaN],
+  ]);
+  expect(await loop.next()).toEqual({ done: false, value: Number.NaN });
+});
+
+it("says that it waits to nobody where a listener has it try again at once", async () => {
+  const subscription = follow(inTurn());
+  const seen: string[] = [];
+  const waits: number[] = [];
+  let isFirst = true;
+  subscription.onWaiting((wait) => waits.push(wait));
+  subscription.state.subscribe(({ status }) => {
+    if (status !== "waiting" || !isFirst) return;
+    isFirst = false;
+    subscription.retryNow();
+  });
+  subscription.state.subscribe(({ status }) => void seen.push(status));
+  await until(() => waits.length > 0);
+  expect([seen, waits]).toEqual([["connecting", "connecting", "waiting"], [20]]);
+  await subscription.close();
 });
 
 it("keeps the value of a wire as a store", async () => {

@@ -35,8 +35,11 @@ export class ValueStore<T> implements Store<T> {
 
   set(value: T): void {
     this.#value = value;
-    for (const listener of [...this.#listeners]) callSafely(() => listener(value));
     for (const loop of [...this.#loops]) loop.push(value);
+    for (const listener of [...this.#listeners]) {
+      if (!Object.is(this.#value, value)) return; // one of them has set another, which all have heard of
+      callSafely(() => listener(value));
+    }
   }
 
   /** Ends the loops; the value stays. */

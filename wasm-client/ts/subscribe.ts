@@ -326,6 +326,7 @@ export class Subscription<T = RemoteObject> {
     const wait = this.#backoff.next();
     this.#stopWaiting = this.#clock.after(wait, () => void this.#connect());
     this.#become({ status: "waiting", reason: this.#reason, nextTry: Date.now() + wait });
+    if (this.#state.getSnapshot().status !== "waiting") return; // a listener has ended the wait
     for (const waiting of [...this.#waiting]) callSafely(() => waiting(wait));
   }
 
