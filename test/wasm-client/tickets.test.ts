@@ -49,13 +49,25 @@ it("says that the token was refused, and that the gateway is away", async () => 
   answer = () => new Response("", { status: 401 });
   const refused = await failure(connect(url, { token: "rrg_old" }));
   expect(refused.code).toBe(ErrorCode.AuthenticationError);
-  expect(refused.message).toBe("ticket of https://gateway.lab/cell/api/v1/tickets: HTTP 401");
+  expect(refused.message).toBe("no ticket of https://gateway.lab/cell/api/v1/tickets: HTTP 401");
   answer = () => {
     throw new TypeError("Failed to fetch");
   };
   const away = await failure(connect(url, { token: "rrg_old" }));
   expect(away.code).toBe(ErrorCode.ConnectionError);
   expect(away.message).toContain("Failed to fetch");
+  expect(opened).toEqual([]);
+});
+
+it.each([
+  ["a page", () => new Response("<!doctype html>")],
+  ["no ticket", () => Response.json({ tickets: [] })],
+  ["nothing", () => Response.json(null)],
+])("says that %s is no ticket", async (_, given) => {
+  answer = given;
+  const error = await failure(connect(url, { token: "rrg_secret" }));
+  expect(error.code).toBe(ErrorCode.ConnectionError);
+  expect(error.message).toBe("no ticket of https://gateway.lab/cell/api/v1/tickets: HTTP 200");
   expect(opened).toEqual([]);
 });
 

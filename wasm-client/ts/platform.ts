@@ -51,13 +51,14 @@ export const platform: Platform = {
 /** Source: POST /api/v1/tickets of the gateway whose devices/NAME `socket` is. */
 async function fetchTicket(socket: URL, proof: Proof): Promise<string> {
   const url = new URL("../api/v1/tickets", socket.href.replace(/^ws/, "http"));
-  const where = `ticket of ${url.href}`;
+  const where = `no ticket of ${url.href}`;
   // Without "omit" a refused token would open the browser's own dialog.
   const request = { method: "POST", headers: headersOf(proof), credentials: "omit", cache: "no-store" } as const;
   const response = await fetch(url, request).catch((error: unknown) => {
     throw makeError("ConnectionError", `${where}: ${textOf(error)}`);
   });
-  if (response.ok) return ((await response.json()) as { ticket: string }).ticket;
+  const { ticket } = (response.ok ? ((await response.json().catch(() => undefined)) ?? {}) : {}) as { ticket?: string };
+  if (ticket) return ticket;
   const isRefused = response.status === 401 || response.status === 403;
   throw makeError(isRefused ? "AuthenticationError" : "ConnectionError", `${where}: HTTP ${response.status}`);
 }
