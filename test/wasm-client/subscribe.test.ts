@@ -588,3 +588,26 @@ it("follows a type: the first device that works, asked for anew after each loss"
   expect(tried.at(-1)).toBe("/devices/b");
   await subscription.close();
 });
+
+it("gives up a gateway that does not say what devices it has, and asks again", async () => {
+  const service = await start();
+  const requests: AbortSignal[] = [];
+  vi.stubGlobal("fetch", (_: URL, { signal }: { signal: AbortSignal }) => {
+    requests.push(signal);
+    return new Promise(() => undefined);
+  });
+  const failed: unknown[] = [];
+  const query = { gateway: "http://gateway", type };
+  const subscription = subscribe(query, { transport: service.transport, clock, timeout: 300 });
+  subscription.onFailed((error, at) => failed.push([at, (error as Error).message]));
+  await vi.waitUntil(() => clock.waits.length > 0);
+  expect(failed).toEqual([["http://gateway", "devices of the gateway http://gateway: no answer within 300 ms"]]);
+  expect(requests.map(({ aborted }) => aborted)).toEqual([true]);
+  answerDevices(["a", "online", type]);
+  clock.fire();
+  await subscription.client();
+  await subscription.close();
+  vi.stubGlobal("fetch", () => new Promise(() => undefined));
+  const reason = new Error("enough");
+  expect(await failure(findServices({ gateway: "http://gateway", type }, AbortSignal.abort(reason)))).toBe(reason);
+});

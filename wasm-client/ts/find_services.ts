@@ -22,11 +22,14 @@ export interface ServiceQuery extends Proof {
   type: string;
   /** Which of them; all. */
   filter?: ((found: FoundService) => boolean) | undefined;
+  /** Milliseconds for the gateway's answer; 30,000. */
+  timeout?: number | undefined;
 }
 
 /**
  * The services that are there now, on devices that are online.
- * @throws RobotRaconteurError ConnectionError: the gateway is not reached, or answers something else.
+ * @throws RobotRaconteurError ConnectionError: the gateway is not reached, or answers something else; RequestTimeout; the reason
+ *         of `signal`.
  */
 export async function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
   return (await import("./services/find_services.js")).findServices(query, signal);

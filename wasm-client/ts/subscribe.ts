@@ -285,9 +285,8 @@ export class Subscription<T = RemoteObject> {
   async #ways(): Promise<readonly Way[]> {
     const query = this.#urls;
     if (!("gateway" in query)) return query;
-    const { token, headers } = this.#options;
     try {
-      const found = await findServices({ token, headers, ...query }, this.#ending.signal);
+      const found = await findServices({ ...this.#options, ...query }, this.#ending.signal);
       if (found.length > 0) return found.map(({ url }) => url);
       throw makeError("ServiceNotFound", `no service of type ${query.type} at the gateway ${query.gateway}`);
     } catch (error) {

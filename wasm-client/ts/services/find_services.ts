@@ -2,6 +2,7 @@
 import { makeError, textOf } from "../errors.js";
 import type { FoundService, ServiceQuery } from "../find_services.js";
 import { headersOf } from "../platform.js";
+import { within } from "../within.js";
 
 /* eslint-disable @typescript-eslint/naming-convention -- names of the gateway */
 interface Device {
@@ -13,12 +14,19 @@ interface Device {
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
-export async function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
+export function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
+  const { gateway, timeout = 30_000 } = query;
+  const ending = new AbortController();
+  const late = `devices of the gateway ${gateway}: no answer`;
+  return within(ask(query, ending.signal), { signal, timeout }, late).finally(() => ending.abort());
+}
+
+async function ask(query: ServiceQuery, signal: AbortSignal): Promise<FoundService[]> {
   const found: FoundService[] = [];
   try {
     const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
     const headers = headersOf(query);
-    const request = { headers, signal: signal ?? null, cache: "no-store" } as const;
+    const request = { headers, signal, cache: "no-store" } as const;
     const response = await fetch(new URL("api/v1/devices", gateway), request);
     if (!response.ok) throw new Error(`HTTP ${response.status}`);
     for (const { name, state, node_id: nodeId, node_name: nodeName, services } of (
