@@ -1,7 +1,8 @@
 // rrgate-client/svelte with Svelte's own stores: one that derives from ours, and get().
 import { derived, get } from "svelte/store";
-import { subscribe } from "../../wasm-client/dist/node.js";
+import { subscribe, type OpenTransport } from "../../wasm-client/dist/node.js";
 import { callStore, deviceStore, listen, propertyStore, wireStore } from "../../wasm-client/dist/svelte/svelte.js";
+import type { MemberState } from "../../wasm-client/dist/svelte/svelte.js";
 import { startDevice, until, url } from "./framework_device.js";
 
 it("shows a device while somebody looks at it", async () => {
@@ -64,7 +65,8 @@ it("reads a property again when the read before is answered, and says that a fro
   try {
     const answers: { give: (value: number) => void; fail: (error: Error) => void }[] = [];
     const read = () => new Promise<number>((give, fail) => answers.push({ give, fail }));
-    const device = { onConnected: () => () => undefined, defaultClient: { $: { member: () => ({ get: read }) } } };
+    const never = () => () => undefined;
+    const device = { onConnected: never, onLost: never, defaultClient: { $: { member: () => ({ get: read }) } } };
     const speed = propertyStore(device as never, "speed", { every: 100 });
     const stop = speed.subscribe(() => undefined);
     await vi.advanceTimersByTimeAsync(250);
@@ -101,6 +103,27 @@ it("keeps what a wire gave when the connection is lost, and says how old it is a
   service.drop("gone");
   await until(() => !get(level).isConnected);
   expect(get(level)).toEqual({ value: 21, time, receivedAt, isConnected: false });
+  stop();
+  await device.close();
+});
+
+it("says that a property is not read while the connection is lost", async () => {
+  const [first, second] = [await startDevice(), await startDevice()];
+  const services = [first.service, second.service];
+  const transport: OpenTransport = (to, listener) => services.shift()!.transport(to, listener);
+  const device = subscribe(url, { transport, firstRetry: 1 });
+  await device.client();
+  const speed = propertyStore(device, "speed", { every: 5 });
+  const seen: MemberState<unknown>[] = [];
+  const stop = speed.subscribe((state) => void seen.push(state));
+  await until(() => get(speed).value === 0 && !get(speed).isBusy);
+  let lost: MemberState<unknown> | undefined;
+  device.onLost(() => (lost = get(speed)));
+  first.service.drop("the cable is out");
+  await until(() => lost !== undefined);
+  expect(lost).toMatchObject({ value: 0, error: { message: "the cable is out" } });
+  await until(() => get(speed).error === undefined && !get(speed).isBusy);
+  expect(get(speed)).toEqual({ value: 0, error: undefined, isBusy: false });
   stop();
   await device.close();
 });

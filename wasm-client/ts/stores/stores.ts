@@ -207,12 +207,15 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
 ): PropertyStore<ValueOf<T, K>, SettableOf<T, K>> {
   type V = ValueOf<T, K>;
   const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => {
-    const stop = device?.onConnected(() => void refresh());
+    const stops = [
+      device?.onConnected(() => void refresh()),
+      device?.onLost((error) => store.show({ ...store.getSnapshot(), error })),
+    ];
     // One read at a time: only the newest tells anything, so that the answer to a slower one would never be heard.
     const tick = () => device?.defaultClient && !store.getSnapshot().isBusy && void refresh();
     const timer = every === undefined ? undefined : setInterval(tick, every);
     return () => {
-      stop?.();
+      for (const stop of stops) stop?.();
       clearInterval(timer);
     };
   });
