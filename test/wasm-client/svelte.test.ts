@@ -128,6 +128,23 @@ it("says that a property is not read while the connection is lost", async () => 
   await device.close();
 });
 
+it("gives the same store again, with what it knows, while the device is the same", async () => {
+  const { options } = await startDevice();
+  const device = subscribe(url, options);
+  const other = subscribe(url, (await startDevice()).options);
+  expect(wireStore(device, "level")).toBe(wireStore(device, "level", {}));
+  expect(wireStore(device, "level")).not.toBe(wireStore(other, "level"));
+  expect(wireStore(device, "level")).not.toBe(wireStore(device, "level", { path: "*.arm" }));
+  expect(propertyStore(device, "speed", { every: 100 })).toBe(propertyStore(device, "speed", { every: 100 }));
+  expect(propertyStore(device, "speed", { every: 100 })).not.toBe(propertyStore(device, "speed"));
+  await device.client();
+  await expect(callStore(device, "fail").call("RobotRaconteur.OperationFailed", "stuck")).rejects.toThrow("stuck");
+  expect(get(callStore(device, "fail")).error).toMatchObject({ message: "stuck" });
+  await expect(callStore(undefined, "fail").call()).rejects.toThrow("not connected");
+  expect(get(callStore(undefined, "fail")).error).toBeUndefined();
+  await Promise.all([device.close(), other.close()]);
+});
+
 it("says of a subscription that is closed that nothing comes", async () => {
   const { options } = await startDevice();
   const device = subscribe(url, options);
