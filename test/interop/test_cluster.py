@@ -109,6 +109,7 @@ def test_each_device_has_one_gateway(cluster):
     for name in DEVICES:
         for address in ("127.0.0.2", "127.0.0.3", "127.0.0.4"):
             read_property(cluster, name, address)
+            read_property(cluster, f"%{ord(name[0]):02x}{name[1:]}", address)  # the same name: its letters may be encoded
     by_http = owners(cluster, cluster.sessions_of)
     assert set(by_http) == set(DEVICES)
     assert by_websocket.items() <= by_http.items()
