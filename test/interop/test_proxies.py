@@ -13,12 +13,13 @@ import yaml
 from clients import run_and_check
 from clients import JS, run_program
 from directions import PEERS
-from http_api import BASE, CLIENT, fetch, open_websocket
+from http_api import BASE, CLIENT, Stream, ask, fetch, open_websocket
 from processes import Background, start_gateway
 from reverse_proxies import CONFIGS, PROXIES, ReverseProxy
 from scenarios import SCENARIO
 
 IDLE_SECONDS = float(os.environ.get("RRGATE_IDLE_SECONDS", "2"))  # longer than what the proxies' other timeouts allow here
+CLUSTERS = ["../cluster/nginx.conf", "../cluster/haproxy.cfg"]
 STEPS = SCENARIO["functions"].steps + SCENARIO["large_arrays"].steps + SCENARIO["events"].steps
 
 
@@ -43,6 +44,11 @@ def proxy(request, gateway, tmp_path_factory):
 def site(request, proxy):
     """(port, path before all others)."""
     return (proxy.root, "") if request.param == "root" else (proxy.below, "/robots")
+
+
+def name_of(config):
+    """Of the proxy whose configuration it is."""
+    return next((name for name, file in PROXIES.items() if file == config), config.split("/")[-1].split(".")[0])
 
 
 def device_of(port, prefix, headers={}):
@@ -108,6 +114,24 @@ def test_sessions(site, client):
     run_and_check(client, entry["websocket_url"] + "?service=interop", STEPS)
 
 
+def test_each_event_of_a_stream_comes_at_once(site, gateway):
+    """None waits in the proxy for others to come, or for what the client acknowledges."""
+    port, prefix = site
+
+    def seconds(port, base):
+        """Of 40 events, each asked for when the one before has come."""
+        stream = Stream(port, base + "/changed")
+        began = time.monotonic()
+        for _ in range(40):
+            assert ask(port, "POST", base + "/fire", {"count": 1}).status == 200
+            stream.next()
+        stream.close()
+        return time.monotonic() - began
+
+    direct, through = seconds(gateway[0], BASE), seconds(port, prefix + BASE)
+    assert through < direct + 40 * 0.05, (direct, through)
+
+
 def test_nobody_says_by_a_header_who_he_is(device, tmp_path, proxy):
     """The gateway believes the proxy, and the proxy takes away what clients put there."""
     access = {"identity_headers": {"user": "X-Forwarded-User", "roles": "X-Forwarded-Groups"}}
@@ -158,14 +182,13 @@ def test_an_idle_session(proxy):
     link.close()
 
 
-@pytest.mark.parametrize("config", [*PROXIES.values(), "../cluster/nginx.conf", "../cluster/haproxy.cfg"])
+@pytest.mark.parametrize("config", [*PROXIES.values(), *CLUSTERS])
 def test_an_answer_that_takes_its_time(config, tmp_path):
     """The device is held for longer than clients may be silent: it is the gateway that says how long to wait."""
     device = Background([sys.executable, PEERS / "service.py"], tmp_path / "device.log")
     url = json.loads(device.next_line())["url"]
     process, port = start_gateway(tmp_path, url, trusted_proxies=["127.0.0.1"])
-    name = next((name for name, file in PROXIES.items() if file == config), config.split("/")[-1].split(".")[0])
-    proxy = ReverseProxy(name, config, tmp_path, port, {number: port for number in (8091, 8092, 8093)})
+    proxy = ReverseProxy(name_of(config), config, tmp_path, port, {number: port for number in (8091, 8092, 8093)})
     try:
         asked = f"GET {BASE}/p_double HTTP/1.1\r\nHost: 127.0.0.1:{proxy.root}\r\nConnection: close\r\n\r\n".encode()
         assert fetch(proxy.root, f"{BASE}/p_double")[0] == 200
