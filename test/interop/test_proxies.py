@@ -103,6 +103,8 @@ def test_the_page_below_a_path_has_its_slash(proxy):
 def test_metrics_are_not_for_everybody(site):
     port, prefix = site
     assert fetch(port, prefix + "/metrics")[0] == 403
+    for other in ("/%6detrics", "//metrics", "/./metrics", "/metrics/"):
+        assert fetch(port, prefix + other)[0] in (403, 404), other
 
 
 @pytest.mark.parametrize("client", ["reference", "node"])
@@ -112,6 +114,14 @@ def test_sessions(site, client):
     entry = device_of(port, prefix)
     assert entry["websocket_url"] == f"ws://127.0.0.1:{port}{prefix}/devices/interop"
     run_and_check(client, entry["websocket_url"] + "?service=interop", STEPS)
+
+
+def test_what_is_escaped_in_a_path_arrives_escaped(site):
+    """A slash in the key of an object is no slash of the path."""
+    port, prefix = site
+    status, _, body = fetch(port, prefix + BASE + "/named/left%2Fright/name")
+    assert (status, json.loads(body)) == (200, "named left/right")
+    assert json.loads(fetch(port, prefix + BASE + "/named/right%20hand/name?of=nothing")[2]) == "named right hand"
 
 
 def test_each_event_of_a_stream_comes_at_once(site, gateway):

@@ -92,7 +92,7 @@ class Interop:
         self.cleared = RR.EventHook()
         self._head = Part("head")
         self._parts = {index: Part(f"number {index}") for index in (0, 1, 7)}
-        self._named = {key: Part(f"named {key}") for key in ("left", "right hand", "a.b")}
+        self._named = {key: Part(f"named {key}") for key in ("left", "right hand", "left/right", "a.b")}
         self._special = SpecialPart("special")
 
     def RRServiceObjectInit(self, context, path):
