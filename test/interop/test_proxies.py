@@ -124,6 +124,18 @@ def test_what_is_escaped_in_a_path_arrives_escaped(site):
     assert json.loads(fetch(port, prefix + BASE + "/named/right%20hand/name?of=nothing")[2]) == "named right hand"
 
 
+@pytest.mark.parametrize("config", [*PROXIES.values(), *CLUSTERS])
+def test_large_bodies(config, gateway, tmp_path):
+    """2 MB, of the 16 MB that the gateway takes."""
+    proxy = ReverseProxy(name_of(config), config, tmp_path, gateway[0], {number: gateway[0] for number in (8091, 8092, 8093)})
+    try:
+        for port, prefix in [(proxy.root, "")] + [(proxy.below, "/robots")] * (config not in CLUSTERS):
+            done = ask(port, "PUT", prefix + BASE + "/p_string", "2 MB" * 500_000)
+            assert done.status == 204, done.body
+    finally:
+        proxy.stop()
+
+
 def test_each_event_of_a_stream_comes_at_once(site, gateway):
     """None waits in the proxy for others to come, or for what the client acknowledges."""
     port, prefix = site
