@@ -26,6 +26,9 @@ import tarfile
 TAKEN = ("usr/bin/rrgate", "usr/libexec/rrgate/", "usr/share/rrgate/", "usr/share/doc/rrgate/copyright",
          "usr/share/doc/rrgate/third-party.txt")
 USERS = {"etc/passwd": b"rrgate:x:10001:10001::/:/nonexistent\n", "etc/group": b"rrgate:x:10001:\n"}
+# What a gateway writes, for volumes: a new one takes owner and mode from here.
+WRITTEN = ("var/lib/rrgate", "var/log/rrgate")
+USER = 10001
 CAS, CA_BUNDLE = "usr/share/ca-certificates/mozilla/", "etc/ssl/certs/ca-certificates.crt"
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}
 ELF_MACHINES = {"amd64": 62, "arm64": 183}
@@ -146,7 +149,7 @@ def tree_of(package, libraries, config):
 
 
 def layer_of(tree, epoch):
-    folders = {str(parent) for name in tree for parent in pathlib.PurePosixPath(name).parents} - {"."} | {"tmp"}
+    folders = {str(parent) for name in [*tree, *WRITTEN] for parent in pathlib.PurePosixPath(name).parents} - {"."} | {"tmp", *WRITTEN}
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as tar:
         for name in sorted(folders | set(tree)):
@@ -158,6 +161,8 @@ def layer_of(tree, epoch):
                 tar.addfile(entry, io.BytesIO(data))
             else:
                 entry.type, entry.mode = tarfile.DIRTYPE, 0o1777 if name == "tmp" else 0o755
+                if name in WRITTEN:
+                    entry.mode, entry.uid, entry.gid = 0o750, USER, USER
                 tar.addfile(entry)
     return buffer.getvalue()
 

@@ -130,6 +130,7 @@ class Image(unittest.TestCase):
         with tarfile.open(fileobj=io.BytesIO(layer)) as tar:
             members = {member.name: member for member in tar}
             self.assertEqual(tar.extractfile("etc/ssl/certs/ca-certificates.crt").read(), b"first\nsecond\n")
+        self.assertIn("ROBOTRACONTEUR_USER_HOME=/var/lib/rrgate", start["Env"])
         self.assertIn("SSL_CERT_FILE=/etc/ssl/certs/ca-certificates.crt", start["Env"])
         self.assertEqual({name for name, member in members.items() if member.isfile()}, {
             "usr/bin/rrgate", "usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html", "usr/share/doc/rrgate/third-party.txt", interpreter[1:],
@@ -137,7 +138,11 @@ class Image(unittest.TestCase):
             "usr/share/doc/libssl3/copyright", "usr/share/doc/ca-certificates/copyright", "etc/ssl/certs/ca-certificates.crt", *(f"usr/lib/{triplet}/{name}" for name in ("libc.so.6", "libssl.so.3", "libcrypto.so.3")),
             *(f"var/lib/dpkg/status.d/{name}" for name in ("rrgate", "libc6", "libssl3", "ca-certificates"))})
         self.assertEqual((members["tmp"].mode, members["usr/bin/rrgate"].mode, members["etc/passwd"].mode), (0o1777, 0o755, 0o644))
-        self.assertTrue(all((member.uid, member.gid, member.mtime) == (0, 0, 1700000000) for member in members.values()))
+        written = {name: member.mode for name, member in members.items() if (member.uid, member.gid) == (10001, 10001)}
+        self.assertEqual(written, {"var/lib/rrgate": 0o750, "var/log/rrgate": 0o750})
+        self.assertIn("var/log", members)
+        self.assertTrue(all((member.uid, member.gid) == (0, 0) for name, member in members.items() if name not in written))
+        self.assertTrue(all(member.mtime == 1700000000 for member in members.values()))
 
     def test_the_bill_of_materials_has_the_packages_in_the_image(self):
         done, image = self.run_tool(self.put_packages("arm64"))

@@ -20,6 +20,8 @@ fi
 
 mkdir -p "$root/usr/libexec" "$root/etc/rrgate" "$root/tmp"
 chmod 1777 "$root/tmp"
+# What a gateway writes, for volumes: a new one takes owner and mode from here.
+install -d -o 10001 -g 10001 -m 0750 "$root/var/lib/rrgate" "$root/var/log/rrgate"
 install -D "$prebuilt/bin/rrgate" "$root/usr/bin/rrgate"
 cp -r "$prebuilt/libexec/rrgate" "$root/usr/libexec/rrgate"
 cp -r "$prebuilt/share" "$root/usr/share"

@@ -15,11 +15,13 @@ import jsonschema_rs
 import pytest
 import yaml
 
-from gateways import RRGATE, running
-from http_api import fetch
+from access_gateways import cookie_of
+from gateways import RRGATE, rrgate, running
+from http_api import ask, fetch
 from machine import need
 from processes import BUILD, ROOT, START_DEADLINE, free_port
-from reverse_proxies import UNPACKED
+from reverse_proxies import UNPACKED, is_open
+from users import bearer
 
 DOCKER = ROOT / "docker"
 DEPS = ROOT / "build" / "deps"
@@ -191,6 +193,47 @@ def test_a_container(podman, image, tmp_path):
         assert about["State"]["ExitCode"] == 0
     finally:
         podman("rm", "-f", "gateway", "create", fails=True)
+
+
+def test_what_a_gateway_keeps_is_in_volumes(podman, image, tmp_path):
+    """Read-only otherwise, as docs/deploy.md has it: who has signed out, and the audit log, in a container after another."""
+    port = free_port()
+    tmp_path.chmod(0o750)
+    os.chown(tmp_path, 0, 10001)
+    token = rrgate("token", tmp_path / "tokens", "ci", "--roles", "admin")
+    for name, text in {"ticket.key": "of this test alone " * 3, "gateway.json": json.dumps({
+            "listen": [f"127.0.0.1:{port}"], "devices": [], "audit": {"file": "/var/log/rrgate/audit.jsonl"},
+            "access": {"tokens_file": "tokens", "ticket_key_file": "ticket.key"}})}.items():
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o640)
+        os.chown(tmp_path / name, 0, 10001)
+    page = {"Origin": f"http://127.0.0.1:{port}"}
+
+    def start():
+        podman("run", "-d", "--name=keeper", "--network=host", "--cgroups=disabled", "--no-healthcheck", "--read-only",
+               "--read-only-tmpfs=false", "--cap-drop=ALL", f"--volume={tmp_path}:/etc/rrgate:ro",
+               "--volume=state:/var/lib/rrgate", "--volume=log:/var/log/rrgate", image)
+        deadline = time.monotonic() + START_DEADLINE
+        while not is_open(port):
+            assert time.monotonic() < deadline, podman("ps", "-a")
+            time.sleep(0.05)
+
+    def who(cookie):
+        return ask(port, "GET", "/api/v1/access", headers={"Cookie": cookie}).json["user"]
+
+    try:
+        start()
+        cookies = [cookie_of(ask(port, "POST", "/api/v1/session", headers={**page, **bearer(token)})) for _ in range(2)]
+        assert ask(port, "DELETE", "/api/v1/session", headers={**page, "Cookie": cookies[0]}).status == 204
+        podman("rm", "-f", "-t", "20", "keeper")
+        start()
+        assert [who(cookie) for cookie in cookies] == [None, "ci"]
+        podman("cp", "keeper:/var/log/rrgate/audit.jsonl", tmp_path / "audit.jsonl")
+        events = [json.loads(line)["event"] for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
+        assert events == ["started", "signed_in", "signed_in", "signed_out", "stopped", "started"]
+    finally:
+        podman("rm", "-f", "keeper", fails=True)
+        podman("volume", "rm", "-f", "state", "log", fails=True)
 
 
 def test_the_demo_in_a_container_asks_for_its_password(podman, image):
