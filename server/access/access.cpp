@@ -74,12 +74,20 @@ void add_role(std::vector<std::string>& roles, const std::string& role) {
 }
 
 /// With the NodeIDs, where the gateway may write: beside its key a service may not. Gateways of one key and one user
-/// share it. Empty: there is no such folder.
-std::string file_of_ended_sign_ins(const rr::Bytes& key) {
+/// share it. Errors   invalid_configuration: there is no such folder.
+rr::Result<std::string> file_of_ended_sign_ins(const rr::Bytes& key) {
   const auto folder = rr::user_state_folder();
-  if (!folder) return {};
+  if (!folder) return folder.error();
   const auto name = rr::hex_text(rr::hmac_sha256(key, rr::as_bytes("signed out"))).substr(0, 16);
   return (*folder / "rrgate" / ("signed-out." + name)).string();
+}
+
+/// So that it holds behind a restart, which cookies outlive where their key is that of a file.
+rr::Result<> keep_signed_out(const SignIns& sign_ins, const rr::Bytes& ticket_key, const Identity& who,
+                             SignIns::Time now) {
+  if (ticket_key.empty()) return {};
+  if (const auto file = file_of_ended_sign_ins(ticket_key); !file) return file.error();
+  return sign_ins.keep_ended(who, now);
 }
 
 /// What goes into the audit log though it was allowed.
@@ -253,8 +261,10 @@ void Access::take(AccessStatePtr next) {
   if (next->ticket_key != state_->ticket_key) {
     const auto key = next->ticket_key.empty() ? rr::random_bytes(min_ticket_key) : next->ticket_key;
     tickets_ = Tickets(key);
-    const auto file = next->ticket_key.empty() ? std::string() : file_of_ended_sign_ins(key);
-    sign_ins_ = SignIns(key, file, std::chrono::system_clock::now());
+    std::string file;
+    if (!next->ticket_key.empty())
+      if (auto found = file_of_ended_sign_ins(key)) file = std::move(*found);
+    sign_ins_ = SignIns(key, std::move(file), std::chrono::system_clock::now());
   }
   state_ = std::move(next);
   users_->set(state_->users);
@@ -298,7 +308,7 @@ void Access::reload(bool is_forced) {
 bool Access::sign_out(const Identity& who) {
   const auto now = std::chrono::system_clock::now();
   if (!sign_ins_.end(who, now)) return false;
-  if (auto kept = sign_ins_.keep_ended(who, now); !kept)
+  if (auto kept = keep_signed_out(sign_ins_, state_->ticket_key, who, now); !kept)
     log(LogLevel::warning, "signing out can't be kept: after a restart a copied cookie is good again",
         {{"error", kept.error().message}});
   state_ = std::make_shared<const AccessState>(*state_);  // so that everybody is judged anew

@@ -49,6 +49,24 @@ def test_sign_ins_hold_at_all_gateways_of_one_key(device, tmp_path):
         assert [line["event"] for line in audit_of(here) if line["event"].startswith("signed")] == ["signed_in", "signed_out"]
 
 
+def test_signing_out_that_no_folder_keeps_is_told(device, tmp_path, monkeypatch):
+    """As in a service without HOME: until the gateway starts again it holds."""
+    for name in ("ROBOTRACONTEUR_SYSTEM_STATE_DIR", "ROBOTRACONTEUR_USER_CONFIG_DIR"):  # of root, and of others
+        monkeypatch.setenv(name, "of-no-use")
+    make_users(tmp_path)
+    (tmp_path / "ticket.key").write_text("of this test alone " * 3)
+    for key, told in (({}, 0), ({"ticket_key_file": "ticket.key"}, 1)):  # without it, no cookie outlives the gateway
+        with running(tmp_path, device, {"users_file": "users", "rules": RULES, **key}) as gateway:
+            page = {"Origin": f"http://127.0.0.1:{gateway.port}"}
+            made = ask(gateway.port, "POST", "/api/v1/session", {"user": "alice", "password": PASSWORDS["alice"]}, page)
+            signed = {**page, "Cookie": cookie_of(made)}
+            assert ask(gateway.port, "DELETE", "/api/v1/session", headers=signed).status == 204
+            assert ask(gateway.port, "GET", "/api/v1/access", headers=signed).json["user"] is None
+        warnings = gateway.events("signing out can't be kept: after a restart a copied cookie is good again")
+        assert len(warnings) == told
+        assert all("ROBOTRACONTEUR_" in each["error"] for each in warnings), warnings
+
+
 def test_json_web_tokens(device, tmp_path):
     issuer = issuers.Issuer("https://id.example", "rrgate")
     (tmp_path / "keys.json").write_text(json.dumps(issuer.key_set()))
