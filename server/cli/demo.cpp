@@ -11,6 +11,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "core/support/random.hpp"
 #include "server/cli/command.hpp"
@@ -233,12 +235,28 @@ void stop_devices(std::vector<DemoDevice>& devices) {
   }
 }
 
+/// A new folder that nobody else reads, in that of temporary files. Errors   io_error: it can't be made there.
+rr::Result<std::filesystem::path> make_temporary_folder() {
+  const char* const named = std::getenv("TMPDIR");  // NOLINT(concurrency-mt-unsafe): there is one thread
+  const std::filesystem::path place(named && *named != '\0' ? named : "/tmp");
+  auto name = (place / "rrgate-demo-XXXXXX").string();
+  if (!::mkdtemp(name.data()))
+    return rr::make_error(rr::ErrorCode::io_error, "no temporary folder can be made in " + place.string() + ": " +
+                                                       std::generic_category().message(errno) +
+                                                       "; TMPDIR names another place");
+  return std::filesystem::path(name);
+}
+
 /// Who may come from other machines. Its file goes with this object.
 class DemoLogin {
  public:
   DemoLogin() {
-    std::string name = (std::filesystem::temp_directory_path() / "rrgate-demo-XXXXXX").string();
-    if (::mkdtemp(name.data())) folder_ = name;
+    auto folder = make_temporary_folder();
+    if (!folder) {
+      password_ = folder.error();
+      return;
+    }
+    folder_ = std::move(*folder);
     password_ = write_first_user(users_file(), user);
   }
   DemoLogin(const DemoLogin&) = delete;

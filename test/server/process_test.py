@@ -272,6 +272,16 @@ class Demo(Files):
                 ask(wrong)
             self.assertEqual(refused.exception.code, 401)
 
+    def test_a_password_needs_a_temporary_folder(self):
+        """Nothing is put into the folder that it is started in instead."""
+        for place in (os.path.join(self.folder.name, "nothing"), "/proc"):
+            with self.subTest(place):
+                refused = subprocess.run([RRGATE, "demo", "--lan", "--port", "0"], capture_output=True, text=True, timeout=30,
+                                         cwd=self.folder.name, env={**os.environ, "TMPDIR": place})
+                self.assertEqual((refused.returncode, refused.stdout), (1, ""))
+                self.assertIn(f"rrgate demo: no temporary folder can be made in {place}: ", refused.stderr)
+                self.assertEqual(os.listdir(self.folder.name), [])
+
 
 class Serving(Files):
     def start(self, **more):
