@@ -59,10 +59,12 @@ class Reader {
  public:
   explicit Reader(const AuditOptions& options) : options_(options) {}
 
-  void take(const std::string& line) const {
+  /// Prints it if it is wanted. False: it is no record.
+  bool take(const std::string& line) const {
     const auto record = rr::read_json(line);
-    if (!record || !record->is_object() || !options_.filter.fits(*record)) return;
-    std::cout << (options_.as_json ? line : describe(*record)) << "\n";
+    if (!record || !record->is_object()) return false;
+    if (options_.filter.fits(*record)) std::cout << (options_.as_json ? line : describe(*record)) << "\n";
+    return true;
   }
 
  private:
@@ -121,6 +123,14 @@ void follow(const std::string& file, std::ifstream in, const Reader& reader) {
   }
 }
 
+/// How many lines are no records. One that the gateway has not written to its end is none of them.
+std::size_t read_audit_file(std::ifstream in, const Reader& reader) {
+  std::size_t out = 0;
+  for (std::string line; std::getline(in, line);)
+    if (!reader.take(line) && !(in.eof() && line.starts_with('{'))) ++out;
+  return out;
+}
+
 int verify(const AuditOptions& options) {
   const auto trail = verify_audit_files(options.files);
   if (!trail) {
@@ -155,22 +165,28 @@ int read_audit(const AuditOptions& given) {
     return exit_unreadable;
   }
   const Reader reader(options);
+  int code = exit_ok;
   for (const auto& file : *files) {
     std::ifstream in(file);
     if (options.follows && file == files->back()) {
       follow(file, std::move(in), reader);
       break;
     }
-    for (std::string line; std::getline(in, line);) reader.take(line);
+    if (const auto strange = read_audit_file(std::move(in), reader); strange > 0) {
+      std::cerr << file << ": " << strange << (strange == 1 ? " line is no record" : " lines are no records") << "\n";
+      code = exit_unreadable;
+    }
   }
-  return exit_ok;
+  return code;
 }
 
 }  // namespace
 
 void add_audit(Commands& commands) {
   const auto [app, options] = commands.add("audit", "Read and verify the audit log", read_audit);
-  app.footer("Exit codes: 0 done; 1 the chain is broken; 2 wrong options or arguments; 3 a file can't be read");
+  app.footer(
+      "Exit codes: 0 done; 1 the chain is broken; 2 wrong options or arguments; 3 a file can't be read, or not all "
+      "of it");
   app.add_option("FILE", options.files, "The file of the option \"audit\", and rotated files; in any order")
       ->required()
       ->option_text("...");

@@ -1,6 +1,7 @@
 """The audit log: what is done on each face makes exactly one record; records are chained, and nothing goes unrecorded where that
 is wanted."""
 import contextlib
+import gzip
 import json
 import re
 import resource
@@ -274,6 +275,32 @@ def test_the_file_is_filtered(site):
     for words in ([], ["--verify"]):
         missing = subprocess.run([RRGATE, "audit", site.folder / "nothing", *words], capture_output=True, text=True)
         assert missing.returncode == 3 and "No such file" in missing.stderr
+
+
+def test_what_is_no_record_is_told(device, tmp_path):
+    """A compressed file is not read, and that must not look as if nothing had happened."""
+    site = Site(tmp_path, device, {"max_bytes": 2000, "keep": 5})
+    for number in range(20):
+        assert ask(site.port, "PUT", BASE + "/p_double", number, bearer(site.token)).status == 204
+    site.stop()
+    rotated = tmp_path / "audit.1"
+    packed = tmp_path / "audit.2.gz"
+    packed.write_bytes(gzip.compress(rotated.read_bytes()))
+    lines = rotated.read_text().splitlines()
+
+    def read(*files):
+        done = subprocess.run([RRGATE, "audit", "--json", *files], capture_output=True, timeout=30)
+        return done.returncode, done.stdout.decode().splitlines(), done.stderr.decode()
+
+    assert read(rotated) == (0, lines, "")
+    code, printed, said = read(rotated, packed)
+    assert (code, printed) == (3, lines) and re.fullmatch(re.escape(str(packed)) + r": \d+ lines? (is|are) no records?\n", said), said
+    # Neither is a record that is being written, nor half of one that a killed gateway left.
+    half = tmp_path / "half"
+    half.write_text("\n".join(lines) + "\n" + lines[0][:40])
+    assert read(half) == (0, lines, "")
+    half.write_text(lines[0] + "\n" + lines[1][:40] + "\n" + lines[2] + "\n")
+    assert read(half) == (3, [lines[0], lines[2]], f"{half}: 1 line is no record\n")
 
 
 def test_following_goes_on_behind_a_rotation(device, tmp_path):
