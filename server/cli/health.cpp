@@ -4,6 +4,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -30,6 +31,28 @@ std::optional<Address> parse_address(std::string_view text) {
   return Address{std::string(host), std::string(text.substr(colon + 1))};
 }
 
+/// What comes back, as far as it comes within the time; empty where the connection is closed without an answer.
+/// nullopt: nobody is there, or whoever is says nothing.
+std::optional<std::string> ask_once(const addrinfo& address, const std::string& request) {
+  const int socket = ::socket(address.ai_family, address.ai_socktype | SOCK_CLOEXEC, address.ai_protocol);
+  if (socket < 0) return std::nullopt;
+  const timeval patience{3, 0};
+  ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+  std::optional<std::string> out;
+  if (::connect(socket, address.ai_addr, address.ai_addrlen) == 0 &&
+      ::send(socket, request.data(), request.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(request.size())) {
+    char buffer[64];
+    const auto size = ::recv(socket, buffer, sizeof(buffer), MSG_WAITALL);
+    if (size >= 0)
+      out.emplace(buffer, static_cast<std::size_t>(size));
+    else if (errno == ECONNRESET)
+      out.emplace();
+  }
+  ::close(socket);
+  return out;
+}
+
 /// The head of the answer, as far as it came within the time; empty where nobody answers.
 std::string ask(const Address& address, std::string_view path) {
   addrinfo hints{};
@@ -37,21 +60,13 @@ std::string ask(const Address& address, std::string_view path) {
   addrinfo* found = nullptr;
   if (::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found) != 0) return {};
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
+  const auto request = "GET " + std::string(path) + " HTTP/1.0\r\nHost: localhost\r\n\r\n";
   std::string answer;
   for (const auto* each = found; each && answer.empty(); each = each->ai_next) {
-    const int socket = ::socket(each->ai_family, each->ai_socktype | SOCK_CLOEXEC, each->ai_protocol);
-    if (socket < 0) continue;
-    const timeval patience{3, 0};
-    ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
-    ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
-    const auto request = "GET " + std::string(path) + " HTTP/1.0\r\nHost: localhost\r\n\r\n";
-    if (::connect(socket, each->ai_addr, each->ai_addrlen) == 0 &&
-        ::send(socket, request.data(), request.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(request.size())) {
-      char buffer[64];
-      const auto size = ::recv(socket, buffer, sizeof(buffer), MSG_WAITALL);
-      if (size > 0) answer.assign(buffer, static_cast<std::size_t>(size));
-    }
-    ::close(socket);
+    auto received = ask_once(*each, request);
+    // A gateway closes it that takes its own machine for a proxy and has "proxy_protocol": "required".
+    if (received && received->empty()) received = ask_once(*each, "PROXY UNKNOWN\r\n" + request);
+    if (received) answer = std::move(*received);
   }
   return answer;
 }

@@ -13,6 +13,7 @@ import yaml
 from clients import run_and_check
 from clients import JS, run_program
 from directions import PEERS
+from gateways import rrgate
 from http_api import BASE, CLIENT, Stream, ask, fetch, open_websocket
 from processes import Background, start_gateway
 from reverse_proxies import CONFIGS, PROXIES, ReverseProxy
@@ -323,6 +324,8 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
         with socket.create_connection(("127.0.0.1", port), 10) as link:
             link.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
             assert link.recv(4096) == b""
+        # Its own machine asks as a proxy that speaks for itself.
+        assert rrgate("health", f"127.0.0.1:{port}") == f"127.0.0.1:{port}: HTTP/1.0 200 OK"
         block = b"\r\n\r\n\0\r\nQUIT\n\x21\x11" + struct.pack(">H4s4sHH", 12, bytes([192, 0, 2, 7]), bytes(4), 4711, 80)
         with socket.create_connection(("127.0.0.1", port), 10) as link:
             for byte in block:  # in as many pieces as there can be
