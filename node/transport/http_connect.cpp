@@ -4,8 +4,10 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/rfc7230.hpp>
+#include <nlohmann/json.hpp>
 
 #include "core/support/random.hpp"
+#include "core/support/whole_number.hpp"
 #include "node/tls/base64.hpp"
 #include "node/transport/websocket.hpp"
 #include "node/transport/websocket_frames.hpp"
@@ -18,6 +20,7 @@ using boost::beast::iequals;
 namespace {
 
 constexpr std::size_t max_header_bytes = 8192;
+constexpr std::size_t max_problem_bytes = 1024;  // its text becomes a part of our message
 
 using Answer = http::response<http::empty_body>;
 
@@ -77,6 +80,24 @@ std::string describe(const Answer& answer) {
   return "status " + std::to_string(answer.result_int()) + " " + quote(std::string_view(reason.data(), reason.size()));
 }
 
+/// Why a server refuses, where it says so as gateways do: the "detail" of a problem document (RFC 9457), as ": text".
+/// Empty where there is none, or not all of it comes.
+awaitable<std::string> read_detail(ByteStream& stream, const Answer& refusal) {
+  const auto size = whole_number<std::size_t>(header(refusal, http::field::content_length));
+  const bool is_problem = header(refusal, http::field::content_type).starts_with("application/problem+json");
+  if (!is_problem || !size || *size > max_problem_bytes) co_return "";
+  Bytes body(*size);
+  for (std::size_t done = 0; done < body.size();) {
+    const auto read = co_await stream.read_some(std::span(body).subspan(done));
+    if (read.error || read.is_end()) co_return "";
+    done += read.bytes;
+  }
+  const auto problem = nlohmann::json::parse(as_text(body), nullptr, false);
+  const auto* detail = problem.is_object() && problem.contains("detail") ? &problem["detail"] : nullptr;
+  if (!detail || !detail->is_string()) co_return "";
+  co_return ": " + detail->get_ref<const std::string&>();
+}
+
 }  // namespace
 
 bool is_extra_header(std::string_view name, std::string_view value) {
@@ -114,7 +135,10 @@ awaitable<Result<std::unique_ptr<ByteStream>>> connect_websocket(std::unique_ptr
 
   const auto answer = co_await ask(*stream, std::move(request), what);
   if (!answer) co_return answer.error();
-  if (answer->result_int() != 101) co_return fail("the server refused with " + describe(*answer));
+  if (answer->result_int() != 101) {
+    const auto detail = co_await read_detail(*stream, *answer);
+    co_return fail("the server refused with " + describe(*answer) + detail);
+  }
   if (!has_token(header(*answer, http::field::upgrade), "websocket") ||
       !has_token(header(*answer, http::field::connection), "upgrade"))
     co_return fail("the answer is no upgrade to a WebSocket");

@@ -13,7 +13,8 @@ namespace rr {
 /// Asks the server of `url` for a WebSocket: its path, its whole query (with service, nodeid and nodename, by which
 /// gateways route), and `headers` besides the necessary ones.
 /// Returns  the WebSocket as a stream of bytes.
-/// Errors   connection_error: refused (with status and reason), an answer that is no upgrade, or the peer has gone.
+/// Errors   connection_error: refused (with status and reason, and what a problem document says of it), an answer that
+///          is no upgrade, or the peer has gone.
 awaitable<Result<std::unique_ptr<ByteStream>>> connect_websocket(std::unique_ptr<ByteStream> stream, ConnectionUrl url,
                                                                  HttpHeaders headers);
 

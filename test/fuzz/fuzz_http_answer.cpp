@@ -60,7 +60,7 @@ rr::awaitable<void> run(std::uint8_t kind, std::unique_ptr<rr::ByteStream> strea
     if (socket)
       co_await drain(**socket, size);
     else
-      require(socket.error().message.size() < 500);
+      require(socket.error().message.size() < 1500);  // with the detail of a problem document
   }
   is_done = true;
 }

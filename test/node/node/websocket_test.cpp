@@ -13,6 +13,7 @@ using namespace rr;
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
 using Catch::Matchers::StartsWith;
 
 namespace {
@@ -135,13 +136,26 @@ TEST_CASE("origins that a node allows may open WebSockets") {
 }
 
 TEST_CASE("a WebSocket to what is none says what came instead") {
+  // What the server answers, and how the error ends.
+  const std::string refusal = "HTTP/1.1 503 Try later\r\n";
+  const std::string problem = refusal + "Content-Type: application/problem+json; charset=utf-8\r\nContent-Length: ";
+  const auto script = GENERATE_COPY(table<std::string, std::string>(
+      {{refusal + "Content-Length: 0\r\n\r\n", "status 503 'Try later'"},
+       {problem + "32\r\n\r\n{\"detail\": \"device 'a' is away\"}", "status 503 'Try later': device 'a' is away"},
+       {problem + "99\r\n\r\n{\"detail\": \"device 'a' is away\"}", "status 503 'Try later'"},
+       {problem + "13\r\n\r\n{\"detail\": 3}", "status 503 'Try later'"},
+       {problem + "4\r\n\r\nnone", "status 503 'Try later'"},
+       {problem + "2000\r\n\r\n{\"detail\": \"x\"}" + std::string(1985, ' '), "status 503 'Try later'"},
+       {refusal + "Content-Type: text/html\r\nContent-Length: 3\r\n\r\n<p>", "status 503 'Try later'"}}));
+  const auto& [answer, told] = script;
+  INFO(answer);
   asio::io_context io;
   tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.1"), 0});
   std::string request;
-  std::thread server([&] {
+  std::thread server([&, &answer = answer] {
     auto socket = acceptor.accept();
     asio::read_until(socket, asio::dynamic_buffer(request), "\r\n\r\n");
-    asio::write(socket, asio::buffer(std::string("HTTP/1.1 503 Try later\r\nContent-Length: 0\r\n\r\n")));
+    asio::write(socket, asio::buffer(answer));
   });
   ConnectOptions options;
   options.dial.headers = {{"Authorization", "Bearer 1"}};
@@ -152,7 +166,7 @@ TEST_CASE("a WebSocket to what is none says what came instead") {
   });
   server.join();
   CHECK(error.code == ErrorCode::connection_error);
-  CHECK_THAT(error.message, Contains("status 503 'Try later'"));
+  CHECK_THAT(error.message, EndsWith(told));
   CHECK_THAT(request, StartsWith("GET /robots/a?token=1&service=Blocks HTTP/1.1\r\n"));
   CHECK_THAT(request, Contains("\r\nAuthorization: Bearer 1\r\n"));
 }
