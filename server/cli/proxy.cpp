@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/cli/command.hpp"
+#include "server/cli/remote_service.hpp"
 #include "server/cli/run_gateway.hpp"
 
 namespace rrgate {
@@ -12,24 +13,40 @@ namespace {
 struct ProxyOptions {
   std::string url;
   std::optional<std::string> name;
+  std::string user;
   std::uint16_t port = 8080;
   bool is_relay = false;
   bool is_json = false;
 };
 
-int run_proxy(const ProxyOptions& options) {
+/// As a file would say it: the rules for names and addresses are the same. Throws   NotUnderstood.
+Config config_of(const ProxyOptions& options) {
   const auto url = rr::parse_url(options.url);
-  if (!url) return usage_error("proxy", url.error().message);
-  // As a file would say it: the rules for names and addresses are the same.
+  if (!url) throw NotUnderstood(url.error().message);
+  auto device = nlohmann::json::object();
+  device["name"] = options.name.value_or(url->service);
+  device["url"] = options.url;
+  device["mode"] = options.is_relay ? "relay" : "shared";
   auto text = nlohmann::json::object();
   text["listen"] = {"127.0.0.1:" + std::to_string(options.port)};
-  text["devices"] = {{{"name", options.name.value_or(url->service)},
-                      {"url", options.url},
-                      {"mode", options.is_relay ? "relay" : "shared"}}};
+  text["devices"] = nlohmann::json::array({device});
   text["log"] = {{"level", "warning"}};
   auto read = parse_config(text.dump());
-  if (!read.findings.empty()) return usage_error("proxy", format_finding("configuration", read.findings.front()));
-  return run_gateway(std::move(read.config), [&](auto&, Gateway&, const auto& addresses) {
+  if (!read.findings.empty()) throw NotUnderstood(format_finding("configuration", read.findings.front()));
+  auto& login = read.config.devices.front().login;
+  login.username = options.user;
+  if (!options.user.empty()) login.credentials.items.emplace_back("password", rr::Value(user_password()));
+  return std::move(read.config);
+}
+
+int run_proxy(const ProxyOptions& options) {
+  Config config;
+  try {
+    config = config_of(options);
+  } catch (const NotUnderstood& mistake) {
+    return usage_error("proxy", mistake.what());
+  }
+  return run_gateway(std::move(config), [&](auto&, Gateway&, const auto& addresses) {
     const auto address = "http://127.0.0.1:" + std::to_string(addresses.front().port) + "/";
     if (options.is_json)
       print_json_line({{"url", address}, {"device", options.url}});
@@ -48,7 +65,10 @@ void add_proxy(Commands& commands) {
       ->check(CLI::Range(0, 65535))
       ->capture_default_str()
       ->option_text("N [8080]");
-  app.add_flag("--relay", options.is_relay, "Give each client its own session with the device");
+  auto* relay = app.add_flag("--relay", options.is_relay, "Give each client its own session with the device");
+  app.add_option("--user", options.user, "Log in at the device, with the password of $RRGATE_PASSWORD")
+      ->excludes(relay)
+      ->option_text("NAME");
   app.add_flag("--json", options.is_json, "Print the address as one line of JSON");
 }
 

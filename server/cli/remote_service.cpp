@@ -103,14 +103,18 @@ CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& co
   return app.add_option(name, count, summary)->check(CLI::Range(1, 1'000'000'000))->option_text("N");
 }
 
+std::string user_password() {
+  auto out = environment("RRGATE_PASSWORD");
+  if (out.empty()) throw NotUnderstood("--user needs the password in the environment: RRGATE_PASSWORD");
+  return out;
+}
+
 RemoteAddress remote_address(const RemoteOptions& options) {
   RemoteAddress out;
   const auto& [url, user, timeout, is_json] = options;
   out.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(timeout * 1000));
   out.options.request_timeout = out.options.connect_timeout = out.timeout;
-  const auto password = environment("RRGATE_PASSWORD");
-  if (!user.empty() && password.empty())
-    throw NotUnderstood("--user needs the password in the environment: RRGATE_PASSWORD");
+  const auto password = user.empty() ? std::string() : user_password();
   out.url = gateway_url(url);
   if (out.url.empty()) {
     out.url = url;
@@ -132,7 +136,17 @@ RemoteAddress remote_address(const RemoteOptions& options) {
 rr::RemoteObject open_service(const RemoteAddress& address) {
   if (const auto parsed = rr::parse_url(address.url); !parsed)
     throw NotUnderstood(parsed.error().message + "; rrgate ls lists services");
-  return rr::connect(address.url, address.options);
+  try {
+    return rr::connect(address.url, address.options);
+  } catch (const rr::Exception& failure) {
+    auto error = failure.error();
+    // The gateway has taken the login in the header, else there would be no WebSocket.
+    if (error.code != rr::ErrorCode::authentication_error || address.options.dial.headers.empty()) throw;
+    error.message +=
+        "; the login was for the gateway, and the device wants one of its own: \"login\" of a shared device in the "
+        "gateway's configuration";
+    throw rr::ClientException(std::move(error));
+  }
 }
 
 std::string address_of_page(std::string_view url) {

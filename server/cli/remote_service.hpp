@@ -42,6 +42,9 @@ CLI::Option* add_json(CLI::App& app, RemoteOptions& options);
 /// A whole number from 1 on.
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary);
 
+/// That of --user: $RRGATE_PASSWORD. Throws   NotUnderstood: there is none.
+std::string user_password();
+
 /// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; without --user, a gateway's token is
 /// that of $RRGATE_TOKEN. Where neither is given, a gateway's login is the stored one.
 struct RemoteAddress {
@@ -53,6 +56,7 @@ struct RemoteAddress {
 /// Of a Robot Raconteur URL, or of a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE" or the dashboard's
 /// "http(s)://HOST:PORT/#/devices/NAME/SERVICE", where the login is the gateway's. Throws   NotUnderstood.
 RemoteAddress remote_address(const RemoteOptions& options);
+/// Throws   NotUnderstood; rr::Exception.
 rr::RemoteObject open_service(const RemoteAddress& address);
 /// "http://h:1/devices/arm?service=Arm" of the dashboard's "http://h:1/#/devices/arm/Arm", "http://h:1/devices/arm" of
 /// "http://h:1/#/devices/arm"; other URLs, and those of an object's page, as they are.

@@ -35,6 +35,13 @@ rr::awaitable<ConnectionPtr> begin_session(std::unique_ptr<rr::ByteStream> strea
       token);
 }
 
+/// Clients know their own logins, not the one that the gateway has for all of them.
+rr::Error with_whose_login(rr::Error error) {
+  if (error.code == rr::ErrorCode::authentication_error)
+    error.message = "the device refuses the gateway's login: " + error.message;
+  return error;
+}
+
 }  // namespace
 
 rr::awaitable<rr::Result<>> Upstream::open() {
@@ -53,13 +60,13 @@ rr::awaitable<rr::Result<>> Upstream::open() {
   requires_user_ = wants_user && !has_login;
   if (requires_user_) opened = co_await open_connection(nobody, true);
   if (wants_user && is_for_all) opened = co_await open_connection(user, false);
-  if (!opened) co_return opened.error();
+  if (!opened) co_return is_for_all ? with_whose_login(opened.error()) : opened.error();
   if (login_.is_late || (is_for_all && !wants_user)) {
     const auto done = co_await log_in(*opened);
     const bool knows_no_users = !done && done.error().code == rr::ErrorCode::invalid_operation;
     if (!done && !(is_for_all && knows_no_users)) {
       (*opened)->disconnect();
-      co_return done.error();
+      co_return is_for_all ? with_whose_login(done.error()) : done.error();
     }
   }
   if (is_closed_) {

@@ -719,3 +719,56 @@ def test_a_gateway_for_one_device_needs_no_file(reynard, tmp_path):
     finally:
         proxy.stop()
     assert Ran(["proxy", reynard, "--name", "a/b"]).refused(NOT_UNDERSTOOD, "'a/b'")
+def test_a_device_that_its_gateway_does_not_reach_is_named(tmp_path):
+    nobody = f"rr+tcp://127.0.0.1:{free_port()}/?service=x"
+    with running(tmp_path, {"devices": [{"name": "relayed", "url": nobody}, {"name": "shared", "url": nobody, "mode": "shared"}]}) as gateway:
+        for name in "relayed", "shared":
+            gateway.wait_for("device offline", device=name)
+        for scheme in "http", "ws", "rr+ws":
+            base = f"{scheme}://127.0.0.1:{gateway.port}/devices"
+            for name in "relayed", "shared":
+                assert Ran(["get", f"{base}/{name}?service=x", "a"]).refused(
+                    UNREACHABLE, f": device '{name}' is offline: connect to ", ": Connection refused")
+            assert Ran(["get", f"{base}/unknown?service=x", "a"]).refused(UNREACHABLE, "no device 'unknown'")
+
+
+def test_a_device_with_users_of_its_own(tmp_path):
+    """Asked directly, and by a gateway that has no users."""
+    service, url = start_service(tmp_path)
+    url = url.replace("service=interop", "service=guarded")
+    right, wrong = ({"environment": {"RRGATE_PASSWORD": password}} for password in ("secret", "guess"))
+    alice = ["get", url, "level", "--user", "alice"]
+    try:
+        assert run(*alice, **right) == "1.5"
+        assert Ran(alice, **wrong).refused(REFUSED, "Authentication Failed")
+        assert Ran(alice).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
+        assert Ran(alice[:3]).refused(REFUSED, "Authentication Failed")
+        with running(tmp_path, {"devices": [{"name": "relayed", "url": url}, {"name": "shared", "url": url, "mode": "shared"}]}) as gateway:
+            for name in "relayed", "shared":
+                gateway.wait_for("device online", device=name)
+                there = f"http://127.0.0.1:{gateway.port}/devices/{name}?service=guarded"
+                refusal = Ran(["get", there, "level", "--user", "alice"], **right)
+                assert refusal.refused(REFUSED, "Authentication Failed; the login was for the gateway, and the device wants one of its own")
+                assert "the login" not in Ran(["get", there, "level"]).error
+    finally:
+        service.stop()
+
+
+
+
+def test_a_gateway_for_one_device_logs_in_there(tmp_path):
+    service, url = start_service(tmp_path)
+    url = url.replace("service=interop", "service=guarded")
+    command = ["proxy", url, "--port", "0", "--user", "alice"]
+    try:
+        for password, told in ("secret", None), ("guess", "the device refuses the gateway's login: "):
+            proxy = Background([RRGATE, *command, "--json"], tmp_path / "log", {"RRGATE_PASSWORD": password})
+            try:
+                get = ["get", f"{json.loads(proxy.next_line())['url']}devices/guarded?service=guarded", "level"]
+                proxy.wait_until(lambda: told in Ran(get).error if told else Ran(get).code == DONE)
+            finally:
+                proxy.stop()
+        assert Ran(command).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
+        assert Ran([*command, "--relay"]).refused(NOT_UNDERSTOOD, "--relay")
+    finally:
+        service.stop()

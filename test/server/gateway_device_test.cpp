@@ -243,7 +243,8 @@ TEST_CASE("who comes while a device refuses the gateway hears why, and not that 
     const auto refusal = refusal_of(way);
     CHECK(refusal.code == rr::ErrorCode::connection_error);
     CHECK_THAT(refusal.message,
-               Catch::Contains("'Robot' of device 'robot'") && Catch::Contains("Authentication Failed"));
+               Catch::Contains("'Robot' of device 'robot': the device refuses the gateway's login: ") &&
+                   Catch::Contains("Authentication Failed"));
   }
   CHECK(refusal_of("rr+tcp://127.0.0.1:" + port + "/?nodename=robot&service=Another").code ==
         rr::ErrorCode::service_not_found);
