@@ -8,6 +8,7 @@
 
 #include "server/cli/ls.hpp"
 #include "server/cli/remote_service.hpp"
+#include "server/cli/stored_logins.hpp"
 
 namespace rrgate {
 
@@ -98,6 +99,29 @@ std::vector<std::string> parameters_of(const std::string& url, const std::string
   return out;
 }
 
+/// Gateways, as far as their services follow.
+std::vector<std::string> known_gateways() {
+  auto out = gateways_of_stored_logins();
+  for (auto& each : out) each += "/";
+  return out;
+}
+
+/// Services around here, and gateways that there are logins for; of a gateway whose host and port are typed, up to the
+/// "/" behind them, the services of its devices.
+std::vector<std::string> urls_of(const std::string& typed) {
+  const auto host = typed.starts_with("http") ? typed.find("://") : std::string::npos;
+  if (host != std::string::npos && typed.find('/', host + 3) != std::string::npos) {
+    RemoteOptions gateway;
+    gateway.url = gateway_base(typed.substr(0, typed.rfind('/') + 1));
+    gateway.timeout = patience;
+    return list_service_urls(gateway, "");
+  }
+  auto out = known_gateways();
+  if (host == std::string::npos)
+    for (auto& each : find_service_urls(std::chrono::seconds(1))) out.push_back(std::move(each));
+  return out;
+}
+
 std::vector<std::string> options_of(const CLI::App& app) {
   std::vector<std::string> out;
   for (const auto* option : app.get_options())
@@ -148,7 +172,8 @@ std::vector<std::string> candidates(const CLI::App& program, std::vector<std::st
   if (next == "ARGUMENT") return parameters_of(operands[0], operands[1]);
   const bool is_member = next == "MEMBER" || next == "OBJECT" || next == "PROPERTY";
   if (is_member && !operands.empty()) return members_of(operands[0], typed, app->get_name());
-  if (next == "URL") return find_service_urls(std::chrono::seconds(1));
+  if (next == "URL") return urls_of(typed);
+  if (next == "GATEWAY") return known_gateways();
   return {};
 }
 

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "core/session/url.hpp"
 #include "node/platform/text_file.hpp"
@@ -50,9 +51,8 @@ std::optional<StoredLogin> read_login(const rr::Json& json) {
   return out;
 }
 
-}  // namespace
-
-StoredLogin find_stored_login(std::string_view gateway) {
+/// By gateway, as the file names it.
+std::vector<std::pair<std::string, StoredLogin>> read_stored_logins() {
   const auto file = logins_file().string();
   struct stat found {};
   if (file.empty() || ::stat(file.c_str(), &found) != 0) return {};
@@ -64,17 +64,32 @@ StoredLogin find_stored_login(std::string_view gateway) {
   if (!json) throw NotUnderstood(file + ": not JSON: " + json.error().message);
   if (!json->is_object() || json->size() != 1 || !json->contains("gateways") || !json->at("gateways").is_object())
     throw NotUnderstood(file + R"(: expected {"gateways": {"https://HOST:PORT": {"token": "..."}}})");
-  const auto wanted = gateway_of(gateway);
-  StoredLogin out;
+  std::vector<std::pair<std::string, StoredLogin>> out;
   for (const auto& [url, login] : json->at("gateways").items()) {
-    const auto known = gateway_of(url);
-    if (!known) throw NotUnderstood(file + ": found gateway " + rr::quote(url) + ", expected http(s)://HOST:PORT");
+    if (!gateway_of(url))
+      throw NotUnderstood(file + ": found gateway " + rr::quote(url) + ", expected http(s)://HOST:PORT");
     const auto read = read_login(login);
     if (!read)
       throw NotUnderstood(file + ": gateway " + rr::quote(url) +
                           R"(: expected {"token": "..."} or {"user": "...", "password": "..."})");
-    if (known == wanted) out = *read;
+    out.emplace_back(url, *read);
   }
+  return out;
+}
+
+}  // namespace
+
+StoredLogin find_stored_login(std::string_view gateway) {
+  const auto wanted = gateway_of(gateway);
+  StoredLogin out;
+  for (auto& [url, login] : read_stored_logins())
+    if (gateway_of(url) == wanted) out = std::move(login);
+  return out;
+}
+
+std::vector<std::string> gateways_of_stored_logins() {
+  std::vector<std::string> out;
+  for (const auto& [url, login] : read_stored_logins()) out.push_back(gateway_base(url));
   return out;
 }
 

@@ -498,8 +498,8 @@ def test_what_a_gateway_reaches_comes_and_goes(tmp_path):
     assert Ran(["ls", "--watch", base]).refused(UNREACHABLE, base)
 
 
-def complete(*words):
-    return run("completion", "words", "--", *words).split()
+def complete(*words, **more):
+    return run("completion", "words", "--", *words, **more).split()
 
 
 def test_shells_ask_what_may_come(reynard):
@@ -568,6 +568,27 @@ def test_check_config_warns_of_tokens_that_the_service_cannot_write(tmp_path_fac
         assert f"warning: user '{user}' can't write {folder}" in warning and "requests for access can't be approved" in warning
         folder.chmod(0o777)
         assert "can't write" not in Ran(["check-config", folder / "gateway.json", "--as-service", user]).error
+def test_shells_ask_a_gateway_for_its_devices(guarded, tmp_path):
+    base = guarded.split("/devices/")[0]
+    file = tmp_path / "rrgate" / "logins.json"
+    file.parent.mkdir()
+    logins = {base: {"user": "alice", "password": PASSWORDS["alice"]}, "https://lab.example/robots/": {"token": "x"}}
+    file.write_text(json.dumps({"gateways": logins}))
+    file.chmod(0o600)
+
+    def complete_there(*words):
+        return complete(*words, environment={"XDG_CONFIG_HOME": str(tmp_path)})
+
+    for typed in "/", "/dev", "/devices/", "/devices/fo", "/devices/fox?service=rey":
+        assert complete_there("get", base + typed) == [guarded], typed
+    assert complete_there("get", base + "/devices/cr") == []
+    assert complete_there("get", guarded, "col") == ["color"]
+    assert complete_there("top", "") == [base + "/", "https://lab.example/robots/"]
+    assert complete_there("get", "http") == complete_there("top", "http") == [base + "/", "https://lab.example/robots/"]
+    assert base + "/" in complete_there("ls", "")
+    assert complete("top", "", environment={"XDG_CONFIG_HOME": "/nowhere"}) == []
+
+
 
 
 def test_check_config_warns_of_recordings_that_the_service_cannot_write(tmp_path_factory):
