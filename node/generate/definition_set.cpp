@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iostream>
+#include <iterator>
 #include <set>
 
 #include "core/robdef/model/names.hpp"
@@ -9,11 +11,53 @@
 
 namespace rrgate {
 
+namespace {
+
+/// Where each definition begins: comments above its "service" belong to it.
+std::vector<std::size_t> find_definitions(std::string_view text) {
+  std::vector<std::size_t> begins{0};
+  std::size_t after_statement = 0;  // of the last line that says something
+  for (std::size_t at = 0; at < text.size();) {
+    const auto end = std::min(text.find('\n', at), text.size() - 1) + 1;
+    auto line = text.substr(at, end - at);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\r\n"), line.size()));
+    if (line.starts_with("service ") && after_statement != 0) begins.push_back(after_statement);
+    if (!line.empty() && !line.starts_with('#')) after_statement = end;
+    at = end;
+  }
+  return begins;
+}
+
+std::vector<rr::ParseResult> parse_standard_input(rr::RobdefMode mode) {
+  const std::string text(std::istreambuf_iterator<char>(std::cin), {});
+  const auto begins = find_definitions(text);
+  std::vector<rr::ParseResult> out;
+  for (std::size_t i = 0; i < begins.size(); ++i) {
+    const auto end = i + 1 < begins.size() ? begins[i + 1] : text.size();
+    const auto part = text.substr(begins[i], end - begins[i]);
+    const auto lines = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(begins[i]), '\n');
+    out.push_back(rr::parse_service_definition(std::string(static_cast<std::size_t>(lines), '\n') + part, mode, "-"));
+    out.back().definition.text = part;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<std::vector<rr::ParseResult>> parse_definitions(const std::string& file, rr::RobdefMode mode) {
+  if (file == "-") return parse_standard_input(mode);
+  const auto text = read_text_file(file);
+  if (!text) return std::nullopt;
+  return std::vector{rr::parse_service_definition(*text, mode, file)};
+}
+
 DefinitionSet DefinitionSet::from_files(std::span<const std::string> files, std::span<const std::string> folders,
                                         rr::RobdefMode mode) {
   DefinitionSet set(mode);
   for (const auto& file : files) {
-    if (set.add_file(file)) set.requested_.push_back(&set.definitions_.back());
+    const auto before = set.definitions_.size();
+    set.add_file(file);
+    for (auto i = before; i < set.definitions_.size(); ++i) set.requested_.push_back(&set.definitions_[i]);
   }
   set.add_imports(folders);
   set.verify();
@@ -22,22 +66,20 @@ DefinitionSet DefinitionSet::from_files(std::span<const std::string> files, std:
 
 DefinitionSet DefinitionSet::from_texts(std::span<const std::string> texts, rr::RobdefMode mode) {
   DefinitionSet set(mode);
-  for (const auto& text : texts) set.requested_.push_back(set.add(text, {}));
+  for (const auto& text : texts) set.requested_.push_back(set.add(rr::parse_service_definition(text, mode)));
   set.verify();
   return set;
 }
 
-const rr::ServiceDefinition* DefinitionSet::add(std::string_view text, std::string_view file) {
-  auto parsed = rr::parse_service_definition(text, mode_, file);
+const rr::ServiceDefinition* DefinitionSet::add(rr::ParseResult parsed) {
   std::move(parsed.diagnostics.begin(), parsed.diagnostics.end(), std::back_inserter(diagnostics_));
   definitions_.push_back(std::move(parsed.definition));
   return &definitions_.back();
 }
 
 bool DefinitionSet::add_file(const std::string& file) {
-  const auto text = read_text_file(file);
-  if (text) {
-    add(*text, file);
+  if (auto parsed = parse_definitions(file, mode_)) {
+    for (auto& each : *parsed) add(std::move(each));
     return true;
   }
   rr::Diagnostic diagnostic;

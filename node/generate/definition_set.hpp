@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,11 +13,15 @@
 
 namespace rrgate {
 
+/// The definition of a file. Standard input ("-") may have several, one behind the other as `rrgate robdef` prints
+/// them; lines of diagnostics are those of all of it. Nothing where there is no file that can be read.
+std::optional<std::vector<rr::ParseResult>> parse_definitions(const std::string& file, rr::RobdefMode mode);
+
 /// A set of definitions, parsed and verified together. Definitions never move.
 class DefinitionSet {
  public:
-  /// Reads `files`; what they import is taken from among them, else from NAME.robdef beside the file that imports it,
-  /// else from NAME.robdef in one of `folders`.
+  /// Reads `files`, of which "-" is standard input; what they import is taken from among them, else from NAME.robdef
+  /// beside the file that imports it, else from NAME.robdef in one of `folders`.
   static DefinitionSet from_files(std::span<const std::string> files, std::span<const std::string> folders,
                                   rr::RobdefMode mode);
   /// The texts must bring every import.
@@ -46,7 +51,7 @@ class DefinitionSet {
   class ImportsFirst;
 
   explicit DefinitionSet(rr::RobdefMode mode) : mode_(mode) {}
-  const rr::ServiceDefinition* add(std::string_view text, std::string_view file);
+  const rr::ServiceDefinition* add(rr::ParseResult parsed);
   bool add_file(const std::string& file);
   void add_imports(std::span<const std::string> folders);
   void verify();

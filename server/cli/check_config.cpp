@@ -1,4 +1,6 @@
 // rrgate check-config: whether `rrgate serve` would take a file. Layer: server/cli.
+#include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "node/tls/client_certificates.hpp"
@@ -46,7 +48,8 @@ std::vector<Finding> judge_files(const Config& config) {
 
 /// Errors   those of find_missing_rights().
 rr::Result<CheckedConfig> judge(const CheckOptions& options) {
-  const auto parsed = load_config(options.file);
+  const auto parsed = options.file == "-" ? parse_config(std::string(std::istreambuf_iterator<char>(std::cin), {}))
+                                          : load_config(options.file);
   const auto& config = parsed.config;
   if (!parsed.findings.empty()) return CheckedConfig{parsed.findings};
   if (auto wrong = judge_files(config); !wrong.empty()) return CheckedConfig{std::move(wrong)};
@@ -70,6 +73,8 @@ nlohmann::ordered_json to_json(const std::vector<Finding>& findings) {
 }
 
 int check_config(const CheckOptions& options) {
+  if (options.file == "-" && options.service_user)
+    return usage_error("check-config", "--as-service takes a file, and no standard input");
   const auto name = short_name(options.file);
   const auto verdict = judge(options);
   if (!verdict) return report_failure("check-config", verdict.error().message);
@@ -95,7 +100,7 @@ int check_config(const CheckOptions& options) {
 void add_check_config(Commands& commands) {
   const auto [app, options] = commands.add("check-config", "Check a configuration", check_config);
   app.footer("Exit codes: 0 good; 1 failed; 2 the configuration has errors, or wrong options or arguments");
-  app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
+  app.add_option("FILE", options.file, "Configuration; - for standard input")->required()->option_text(" ");
   app.add_option("--as-service", options.service_user, "Also report files that this user can't read or write")
       ->option_text("USER");
   app.add_flag("--json", options.is_json, "Print errors and warnings as one line of JSON");

@@ -18,7 +18,7 @@ struct DefinitionOptions {
 };
 
 inline void add_files(CLI::App& app, DefinitionOptions& options) {
-  app.add_option("FILE", options.files, "Service definitions")->required()->option_text("...");
+  app.add_option("FILE", options.files, "Service definitions; - for standard input")->required()->option_text("...");
 }
 inline void add_folders(CLI::App& app, DefinitionOptions& options) {
   app.add_option("-I", options.folders, "Folder with imported definitions; may be repeated")

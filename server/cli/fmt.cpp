@@ -2,10 +2,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "core/robdef/format/format_source.hpp"
-#include "node/platform/text_file.hpp"
 #include "server/cli/definition_options.hpp"
 
 namespace rrgate {
@@ -45,46 +45,56 @@ bool replace_file(const std::string& path, std::string_view text) {
   return false;
 }
 
+int format_definition(const FormatOptions& options, const std::string& file, const rr::ParseResult& source) {
+  const auto& text = source.definition.text;
+  if (!source.ok()) {
+    for (const auto& diagnostic : source.diagnostics) {
+      if (options.is_json)
+        print_json_diagnostic(diagnostic);
+      else
+        std::cerr << rr::format_diagnostic(diagnostic) << "\n";
+    }
+    return exit_failed;
+  }
+  if (options.is_check) {
+    const bool is_formatted = rr::format_source(source.definition) == text;
+    if (options.is_json)
+      print_json_line({{"file", file}, {"formatted", is_formatted}});
+    else if (!is_formatted)
+      std::cout << file << "\n";
+    return is_formatted ? exit_ok : exit_failed;
+  }
+  if (!options.in_place) {
+    const auto formatted = rr::format_service_definition(source.definition);
+    if (options.is_json)
+      print_json_line({{"file", file}, {"text", formatted}});
+    else
+      std::cout << formatted;
+    return exit_ok;
+  }
+  const auto formatted = rr::format_source(source.definition);
+  if (formatted != text && !replace_file(file, formatted)) {
+    std::cerr << file << ": error: cannot be written\n";
+    return exit_failed;
+  }
+  if (options.is_json) print_json_line({{"file", file}, {"changed", formatted != text}});
+  return exit_ok;
+}
+
 int format(const FormatOptions& options) {
+  const bool has_input = std::find(options.files.begin(), options.files.end(), "-") != options.files.end();
+  if (has_input && (options.in_place || options.is_check))
+    return usage_error("fmt", "--in-place and --check take files, and no standard input");
   int code = exit_ok;
   for (const auto& file : options.files) {
-    const auto text = read_text_file(file);
-    if (!text) {
+    const auto sources = parse_definitions(file, options.mode());
+    if (!sources) {
       std::cerr << file << ": error: found no file that can be read, expected a service definition\n";
       code = exit_failed;
       continue;
     }
-    const auto source = rr::parse_service_definition(*text, options.mode(), file);
-    if (!source.ok()) {
-      for (const auto& diagnostic : source.diagnostics) {
-        if (options.is_json)
-          print_json_diagnostic(diagnostic);
-        else
-          std::cerr << rr::format_diagnostic(diagnostic) << "\n";
-      }
-      code = exit_failed;
-    } else if (options.is_check) {
-      const bool is_formatted = rr::format_source(source.definition) == *text;
-      if (options.is_json)
-        print_json_line({{"file", file}, {"formatted", is_formatted}});
-      else if (!is_formatted)
-        std::cout << file << "\n";
-      if (!is_formatted) code = exit_failed;
-    } else if (!options.in_place) {
-      const auto formatted = rr::format_service_definition(source.definition);
-      if (options.is_json)
-        print_json_line({{"file", file}, {"text", formatted}});
-      else
-        std::cout << formatted;
-    } else {
-      const auto formatted = rr::format_source(source.definition);
-      if (formatted != *text && !replace_file(file, formatted)) {
-        std::cerr << file << ": error: cannot be written\n";
-        code = exit_failed;
-      } else if (options.is_json) {
-        print_json_line({{"file", file}, {"changed", formatted != *text}});
-      }
-    }
+    for (const auto& source : *sources)
+      if (const int done = format_definition(options, file, source); done != exit_ok) code = done;
   }
   return code;
 }

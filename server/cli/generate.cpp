@@ -78,7 +78,9 @@ int run_generator(const GenerateOptions& options) {
 }
 
 void add_generator(const NewCommand<GenerateOptions>& command, const std::string& output) {
-  command.app.add_option("FILE", command.values.files, "Service definitions, or the URL of a service that has them")
+  command.app
+      .add_option("FILE", command.values.files,
+                  "Service definitions, - for standard input, or the URL of a service that has them")
       ->required()
       ->option_text("... or URL");
   command.app.add_option("-o", command.values.output, output)->option_text("OUT");

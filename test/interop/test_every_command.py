@@ -121,6 +121,39 @@ def test_service_definitions(tmp_path):
     assert [file.rsplit(".", 1)[1] for file in files] == ["hpp", "cpp"]
 
 
+def test_definitions_come_by_standard_input(own_service):
+    """One, or all that a service has, of which some import others."""
+    _, url = own_service
+    assert run("check", "-", given=DEFINITION) == "-: good; org.test.lamp"
+    loose = DEFINITION.replace("    property", "  property")
+    assert run("fmt", "-", given=loose) == DEFINITION.strip()
+    for option in "--check", "--in-place":
+        assert Ran(["fmt", option, "-"], given=loose).refused(NOT_UNDERSTOOD, "standard input")
+    assert "interface Lamp" in run("generate", "ts", "-", given=DEFINITION)
+    several = run("robdef", url)
+    names = re.findall(r"^service (\S+)", several, re.M)
+    assert len(names) > 0
+    pair = "# The first.\nservice org.test.light\n\nstdver 0.10\n\nstruct Light\n    field double red\nend\n\n# The second.\n" + \
+        DEFINITION.replace("object", "import org.test.light\n\nobject").replace("double brightness", "org.test.light.Light light")
+    assert run("check", "-", given=pair).splitlines() == ["-: good; org.test.light", "-: good; org.test.lamp"]
+    assert run("check", "--compat", "-", given=several).splitlines() == [f"-: good; {name}" for name in names]
+    wrong = Ran(["check", "-"], given=pair.replace("light.Light light", "light.Dark light"))
+    line = 1 + pair[:pair.index("property")].count("\n")
+    assert wrong.code == FAILED and wrong.error.startswith(f"-:{line}:"), wrong.error
+    ran = Ran(["fmt", "-"], given=pair.replace("property", "proprety"))
+    assert ran.code == FAILED and ran.error.startswith(f"-:{line}:") and ran.out.startswith("service org.test.light\n")
+    types = run("generate", "ts", "-", given=pair)
+    assert "interface Lamp" in types and "interface Light" in types
+
+
+def test_a_configuration_comes_by_standard_input(tmp_path):
+    config = {"listen": ["127.0.0.1:1"], "devices": []}
+    assert run("check-config", "-", given=json.dumps(config)) == "-: good; 0 devices"
+    ran = Ran(["check-config", "-"], given=json.dumps({**config, "listen": ["8080"]}))
+    assert ran.code == NOT_UNDERSTOOD and ran.error.startswith("-: /listen/0: ")
+    assert Ran(["check-config", "-", "--as-service", "root"], given="{}").refused(NOT_UNDERSTOOD, "standard input")
+
+
 def test_a_definition_is_whole_while_it_is_formatted(tmp_path):
     file, link = tmp_path / "lamp.robdef", tmp_path / "link.robdef"
     loose = DEFINITION.replace("    property", "  property")
