@@ -250,7 +250,13 @@ void watch_services(const ListOptions& options) {
 int ls(const ListOptions& options) {
   return run_remote("ls", options.url.empty() ? "network" : options.url, [&] {
     if (options.watches) return watch_services(options);
-    print_services(list_services(options), "", options.is_json);
+    const auto found = list_services(options);
+    print_services(found, "", options.is_json);
+    if (found.empty() && options.url.empty())
+      std::cerr
+          << "rrgate ls: found nothing within " << options.wait
+          << " s; what does not announce itself, such as gateways and the devices of \"rrgate demo\", is listed by "
+             "its address: rrgate ls http://127.0.0.1:8080\n";
   });
 }
 

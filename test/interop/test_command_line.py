@@ -367,8 +367,9 @@ def slow_reynard(reynard):
 def test_who_waits_at_a_terminal_sees_how_far_it_is(slow_reynard, command, words):
     command = [slow_reynard if word == "URL" else word for word in command]
     shown = shown_on_terminal(*command)
-    assert re.search(words, shown) and shown.endswith("\r\x1b[K"), shown
-    assert Ran(command).error == ""  # no terminal
+    *bars, last = shown.split("\r\x1b[K")
+    assert re.search(words, "".join(bars)) and "%" not in last, shown
+    assert "%" not in Ran(command).error  # no terminal
 
 
 def test_who_waits_for_much_to_pass_sees_how_much_it_is(slow_reynard, tmp_path):
@@ -511,6 +512,12 @@ def test_shells_ask_what_may_come(reynard):
     assert "teleport" in complete("call", reynard, "") and "color" not in complete("call", reynard, "")
     assert complete("call", reynard, "teleport", "") == ["x=", "y="]
     assert complete("serve", "--config", "") == []
+def test_a_search_that_finds_nothing_says_what_else_to_try():
+    ran = Ran(["ls", "--wait", "1", "--type", "experimental.found.Nothing"])
+    assert (ran.code, ran.out, ran.error.count("\n")) == (DONE, "", 1)
+    assert ran.error.startswith("rrgate ls: found nothing within 1 s") and "rrgate ls http://127.0.0.1:8080" in ran.error
+
+
 
 
 def test_services_of_a_type_are_listed(tmp_path):
