@@ -1,13 +1,17 @@
 // rrgate export: the messages of a recorded member as comma-separated values. Layer: server/cli.
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <optional>
 #include <set>
 
 #include "server/cli/command.hpp"
 #include "server/cli/csv.hpp"
+#include "server/cli/progress.hpp"
 #include "server/record/recording.hpp"
 
 namespace rrgate {
@@ -30,25 +34,55 @@ const rr::Json& value_of(const RecordedMember& member, const rr::Json& document)
 }
 
 /// "/value/x" of {"value": {"x": 1}} is "/x", as `rrgate watch --csv` has it.
-rr::Json cells_of(const RecordedMember& member, const rr::Json& document) {
-  const auto flat = value_of(member, document).flatten();
+rr::Json cells_of(const rr::Json& value) {
+  const auto flat = value.flatten();
   return flat.is_object() ? flat : rr::Json{{"", flat}};
 }
 
+/// The messages of a member, which may be passed through several times.
+class MessagePasses {
+ public:
+  /// `shows_progress`  not where that would stand among what is written.
+  MessagePasses(Recording& recording, const RecordedMember& member, std::uint64_t passes, bool shows_progress)
+      : recording_(recording), member_(member) {
+    if (shows_progress) progress_.emplace("exporting", passes * member.message_count);
+  }
+
+  /// Calls `take` with each message, and what the member told.
+  rr::Result<> for_each(const std::function<void(const McapMessage&, const rr::Json& value)>& take) {
+    return recording_.for_each(member_, [&](const McapMessage& message) -> rr::Result<> {
+      const auto document = recording_.read_document(message);
+      if (!document) return document.error();
+      take(message, value_of(member_, *document));
+      if (progress_) progress_->show(++done_);
+      return {};
+    });
+  }
+
+ private:
+  Recording& recording_;
+  const RecordedMember& member_;
+  std::optional<Progress> progress_;
+  std::uint64_t done_ = 0;
+};
+
 class CsvExport {
  public:
-  CsvExport(Recording& recording, const RecordedMember& member) : recording_(recording), member_(member) {}
+  CsvExport(Recording& recording, const RecordedMember& member, bool shows_progress)
+      : topic_(member.topic), messages_(recording, member, 2, shows_progress) {}
 
   rr::Result<> write(std::ostream& out) {
-    auto looked = for_each([this](const McapMessage&, const rr::Json& cells) { add_columns(cells); });
+    auto looked =
+        messages_.for_each([this](const McapMessage&, const rr::Json& value) { add_columns(cells_of(value)); });
     if (!looked) return looked;
     if (columns_.size() > max_columns)
       return rr::make_error(rr::ErrorCode::out_of_range,
-                            member_.topic + " has more than " + std::to_string(max_columns) + " columns");
+                            topic_ + " has more than " + std::to_string(max_columns) + " columns");
     out << "time";
     for (const auto& column : columns_) out << "," << csv_cell(column.empty() ? "value" : column);
     out << "\n";
-    return for_each([&](const McapMessage& message, const rr::Json& cells) {
+    return messages_.for_each([&](const McapMessage& message, const rr::Json& value) {
+      const auto cells = cells_of(value);
       out << mcap_time_text(message.publish_time);
       for (const auto& column : columns_) {
         const auto cell = cells.find(column);
@@ -64,31 +98,22 @@ class CsvExport {
     for (const auto& [column, cell] : cells.items())
       if (columns_.size() <= max_columns && known_.insert(column).second) columns_.push_back(column);
   }
-  rr::Result<> for_each(const std::function<void(const McapMessage&, const rr::Json& cells)>& take) {
-    return recording_.for_each(member_, [&](const McapMessage& message) -> rr::Result<> {
-      const auto document = recording_.read_document(message);
-      if (!document) return document.error();
-      take(message, cells_of(member_, *document));
-      return {};
-    });
-  }
 
-  Recording& recording_;
-  const RecordedMember& member_;
+  const std::string& topic_;
+  MessagePasses messages_;
   std::vector<std::string> columns_;
   std::set<std::string> known_;
 };
 
 /// A line for each message, as `rrgate watch --json` has it: {"time": ..., "value": ...}.
-rr::Result<> write_json_lines(Recording& recording, const RecordedMember& member, std::ostream& out) {
-  return recording.for_each(member, [&](const McapMessage& message) -> rr::Result<> {
-    const auto document = recording.read_document(message);
-    if (!document) return document.error();
+rr::Result<> write_json_lines(Recording& recording, const RecordedMember& member, bool shows_progress,
+                              std::ostream& out) {
+  MessagePasses messages(recording, member, 1, shows_progress);
+  return messages.for_each([&](const McapMessage& message, const rr::Json& value) {
     auto line = rr::OrderedJson::object();
     line["time"] = mcap_time_text(message.publish_time);
-    line["value"] = value_of(member, *document);
+    line["value"] = value;
     out << line.dump() << "\n";
-    return {};
   });
 }
 
@@ -125,8 +150,9 @@ int run_export(const ExportOptions& options) {
   std::ofstream file;
   if (!options.output.empty()) file.open(options.output, std::ios::binary | std::ios::trunc);
   auto& out = options.output.empty() ? std::cout : static_cast<std::ostream&>(file);
-  const auto written =
-      options.is_json ? write_json_lines(*recording, *member, out) : CsvExport(*recording, *member).write(out);
+  const bool shows_progress = !options.output.empty() || !::isatty(STDOUT_FILENO);
+  const auto written = options.is_json ? write_json_lines(*recording, *member, shows_progress, out)
+                                       : CsvExport(*recording, *member, shows_progress).write(out);
   if (!written) return report_failure("export", written.error().message);
   return out.flush() ? exit_ok : report_failure("export", options.output + ": can't be written");
 }

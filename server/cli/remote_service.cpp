@@ -282,6 +282,10 @@ int exit_code_of(const rr::Exception& failure) {
 
 int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run) {
   const auto tell = [&](std::string_view what, int code) {
+    for (const auto& each : {std::string(url), gateway_url(url)}) {  // named once, as it was given
+      const auto named = "URL " + rr::quote(each, 200) + ": ";
+      if (what.starts_with(named)) what.remove_prefix(named.size());
+    }
     std::cerr << "rrgate " << command << ": " << url << ": " << printable(what) << "\n";
     return code;
   };

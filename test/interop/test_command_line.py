@@ -670,7 +670,9 @@ def test_what_is_not_there_is_told_in_time():
         began = time.monotonic()
         assert Ran(["get", url, "a", "--timeout", "1"]).refused(UNREACHABLE, url)
         assert time.monotonic() - began < 10
-    assert Ran(["get", "lab", "a"]).refused(NOT_UNDERSTOOD, "URL 'lab'")
+    for url in "lab", "rr+usb:///?service=x", "http://127.0.0.1:1/devices/arm":
+        refusal = Ran(["get", url, "a"])
+        assert refusal.refused(NOT_UNDERSTOOD, f"rrgate get: {url}: ") and "URL" not in refusal.error, refusal.error
     assert Ran(["get", "rr+tcp://127.0.0.1:1/", "a"]).refused(NOT_UNDERSTOOD, "?service=NAME", "rrgate ls")
     assert Ran(["get", nobody, "a", "--timeout", "never"]).refused(NOT_UNDERSTOOD, "--timeout", "'never'")
 

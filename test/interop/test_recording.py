@@ -3,18 +3,23 @@ import base64
 import csv
 import io
 import json
+import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
+import numpy
 import pytest
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
+from command_line import shown_on_terminal
 from gateways import RRGATE, Gateway
 from processes import BUILD, ROOT, Background, free_port
 
@@ -296,6 +301,33 @@ def test_a_member_is_exported_as_a_table(of_create, tmp_path):
     for output in copy, tmp_path / "link.mcap":
         assert "is the recording itself" in rrgate("export", copy, "--csv", "--member", "state", "-o", output, code=2)
     assert copy.read_bytes() == of_create.read_bytes()
+
+
+def test_who_waits_for_an_export_sees_how_far_it_is(node, own_service, tmp_path):
+    """Into a pipe whose reader takes his time after the first piece."""
+    _, url = own_service
+    path, pipe = tmp_path / "long.mcap", tmp_path / "pipe"
+    recording = subprocess.Popen([RRGATE, "record", url, "-o", path, "--members", "state"], stderr=subprocess.DEVNULL)
+    device = node.ConnectService(url)
+    wait_for(lambda: device.publish_state(numpy.random.rand(2000)) or (path.is_file() and path.stat().st_size > 500_000))
+    recording.send_signal(signal.SIGINT)
+    assert recording.wait(REPLAY_DEADLINE) == 0
+    node.DisconnectService(device)
+    os.mkfifo(pipe)
+
+    def read_slowly():
+        with open(pipe, "rb", buffering=0) as file:
+            file.read(1)
+            time.sleep(0.5)
+            while file.read(1_000_000):
+                pass
+
+    for form in "--csv", "--json":
+        reader = threading.Thread(target=read_slowly)
+        reader.start()
+        shown = shown_on_terminal("export", path, form, "--member", "state", "-o", pipe)
+        reader.join()
+        assert re.search(r"exporting \[#*\.+\] +\d+ %", shown) and shown.endswith("\r\x1b[K"), shown
 
 
 def test_a_member_is_exported_as_json(of_create, tmp_path):
