@@ -33,8 +33,10 @@ std::string declaration(const rr::MemberDefinition& member) {
   return out;
 }
 
+/// Of documentation, where it mostly begins with the space behind "##".
 std::string first_line(const std::string& text) {
-  return text.substr(0, text.find('\n'));
+  const auto line = text.substr(0, text.find('\n'));
+  return line.starts_with(' ') ? line.substr(1) : line;
 }
 
 rr::OrderedJson describe(const RemoteMember& object) {

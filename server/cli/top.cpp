@@ -19,7 +19,7 @@ using std::chrono::steady_clock;
 struct Counts {
   double messages = 0;
   double bytes = 0;
-  double losses = 0;
+  double losses = 0;  ///< values that clients missed, also those that a newer one replaced
 };
 
 struct DeviceLine {
@@ -60,7 +60,7 @@ class GatewayReader {
     for (const auto& each : property("subscriptions")) {
       auto& of_device = counts[each["device"]];
       of_device.messages += number(each["delivered"]);
-      of_device.losses += number(each["dropped"]);
+      of_device.losses += number(each["dropped"]) + number(each["conflated"]);
     }
     for (const auto& each : property("devices"))
       out.devices.push_back({each["name"], each["state"], each["mode"], each["clients"], counts[each["name"]]});

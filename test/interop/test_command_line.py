@@ -16,9 +16,11 @@ import sys
 import tempfile
 import time
 
+import numpy
 import pytest
 import RobotRaconteur as RR
 
+from clients import JS
 from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UNREACHABLE, Ran, run, shown_on_terminal
 from directions import PEERS
 from found_nodes import THEIRS, TYPE
@@ -165,6 +167,24 @@ def test_what_a_service_has_is_told(url):
     assert "wire ReynardState state [readonly]" in run("robdef", url)
     definitions = {each["name"]: each["text"] for each in json.loads(run("robdef", url, "--json"))}
     assert "wire ReynardState state [readonly]" in definitions["experimental.reynard_the_robot"]
+
+
+def test_documentation_and_attributes_are_told(tmp_path):
+    room = Background([BUILD / "examples" / "demo" / "rrgate-demo-conference-room", "--port", free_port()], tmp_path / "log")
+    url = room.next_line().split()[1]
+    try:
+        with running(tmp_path, {"devices": [{"name": "room", "url": url, "mode": "shared"}]}) as gateway:
+            gateway.wait_for("device online")
+            for where in url, f"http://127.0.0.1:{gateway.port}/devices/room?service=Controller":
+                lines = run("info", where).splitlines()
+                assert lines[:2] == ["Controller: experimental.conference_room.Controller", "  Holds what the sensors measure at a target."]
+                at = lines.index("  property Colour target")
+                assert lines[at + 1] == "      In lx, 0 to 1000 of each colour."
+                told = {each["name"]: each["documentation"] for each in json.loads(run("info", where, "--json"))["members"]}
+                assert told["on"].strip() == "While it is off the lights may be set by hand."
+            assert '  attribute rrgate.mode: {"type":"string","value":"shared"}' in lines
+    finally:
+        room.stop()
 
 
 def test_locks_of_a_gateways_device_are_told(node, tmp_path):
@@ -443,8 +463,36 @@ def test_a_gateway_is_watched(guarded, tmp_path):
     shown = json.loads(run("top", guarded.split("/devices/")[0], "--count", "1", "--json", "--user", "alice", **admin))
     assert [(each["device"], each["state"]) for each in shown["devices"]] == [("fox", "online")]
     text = run("top", guarded.split("/devices/")[0], "--count", "1", "--user", "alice", **admin)
-    assert text.startswith("rrgate ") and "fox" in text and "messages/s" in text
+    assert text.startswith("rrgate ") and "fox" in text and "messages/s" in text and "dropped/s" in text
     assert Ran(["top", "rr+tcp://127.0.0.1:1/"]).refused(NOT_UNDERSTOOD, "http")
+
+
+def test_a_gateway_is_watched_round_by_round(node, tmp_path):
+    """One client does not read what the device publishes."""
+    service, url = start_service(tmp_path)
+    slow = watching = None
+    with running(tmp_path, {"devices": [{"name": "interop", "url": url, "mode": "shared"}]}) as gateway:
+        try:
+            gateway.wait_for("session open", service="interop")
+            slow = Background(["node", JS / "losses.mjs", f"ws://127.0.0.1:{gateway.port}/devices/interop?service=interop"], tmp_path / "slow")
+            slow.next_line()
+            slow.pause()
+            watching = Background([RRGATE, "top", f"http://127.0.0.1:{gateway.port}", "--json"], tmp_path / "top")
+            device = node.ConnectService(url)
+
+            def missed():
+                for _ in range(20):
+                    device.publish_state(numpy.zeros(100_000))
+                (line,) = json.loads(watching.next_line())["devices"]
+                assert (line["device"], line["clients"]) == ("interop", 1)
+                return line["dropped_per_second"] > 0 and line["messages_per_second"] > 0
+            slow.wait_until(missed)
+            slow.resume()
+            node.DisconnectService(device)
+        finally:
+            for each in slow, watching, service:
+                if each:
+                    each.stop()
 
 
 def test_what_comes_and_goes_is_told():
@@ -462,6 +510,12 @@ def test_what_comes_and_goes_is_told():
         device.communicate()
         watching.kill()
         watching.communicate()
+
+
+def test_a_search_that_finds_nothing_says_what_else_to_try():
+    ran = Ran(["ls", "--wait", "1", "--type", "experimental.found.Nothing"])
+    assert (ran.code, ran.out, ran.error.count("\n")) == (DONE, "", 1)
+    assert ran.error.startswith("rrgate ls: found nothing within 1 s") and "rrgate ls http://127.0.0.1:8080" in ran.error
 
 
 def test_what_a_gateway_reaches_comes_and_goes(tmp_path):
@@ -512,12 +566,27 @@ def test_shells_ask_what_may_come(reynard):
     assert "teleport" in complete("call", reynard, "") and "color" not in complete("call", reynard, "")
     assert complete("call", reynard, "teleport", "") == ["x=", "y="]
     assert complete("serve", "--config", "") == []
-def test_a_search_that_finds_nothing_says_what_else_to_try():
-    ran = Ran(["ls", "--wait", "1", "--type", "experimental.found.Nothing"])
-    assert (ran.code, ran.out, ran.error.count("\n")) == (DONE, "", 1)
-    assert ran.error.startswith("rrgate ls: found nothing within 1 s") and "rrgate ls http://127.0.0.1:8080" in ran.error
 
 
+def test_shells_ask_a_gateway_for_its_devices(guarded, tmp_path):
+    base = guarded.split("/devices/")[0]
+    file = tmp_path / "rrgate" / "logins.json"
+    file.parent.mkdir()
+    logins = {base: {"user": "alice", "password": PASSWORDS["alice"]}, "https://lab.example/robots/": {"token": "x"}}
+    file.write_text(json.dumps({"gateways": logins}))
+    file.chmod(0o600)
+
+    def complete_there(*words):
+        return complete(*words, environment={"XDG_CONFIG_HOME": str(tmp_path)})
+
+    for typed in "/", "/dev", "/devices/", "/devices/fo", "/devices/fox?service=rey":
+        assert complete_there("get", base + typed) == [guarded], typed
+    assert complete_there("get", base + "/devices/cr") == []
+    assert complete_there("get", guarded, "col") == ["color"]
+    assert complete_there("top", "") == [base + "/", "https://lab.example/robots/"]
+    assert complete_there("get", "http") == complete_there("top", "http") == [base + "/", "https://lab.example/robots/"]
+    assert base + "/" in complete_there("ls", "")
+    assert complete("top", "", environment={"XDG_CONFIG_HOME": "/nowhere"}) == []
 
 
 def test_services_of_a_type_are_listed(tmp_path):
@@ -575,27 +644,6 @@ def test_check_config_warns_of_tokens_that_the_service_cannot_write(tmp_path_fac
         assert f"warning: user '{user}' can't write {folder}" in warning and "requests for access can't be approved" in warning
         folder.chmod(0o777)
         assert "can't write" not in Ran(["check-config", folder / "gateway.json", "--as-service", user]).error
-def test_shells_ask_a_gateway_for_its_devices(guarded, tmp_path):
-    base = guarded.split("/devices/")[0]
-    file = tmp_path / "rrgate" / "logins.json"
-    file.parent.mkdir()
-    logins = {base: {"user": "alice", "password": PASSWORDS["alice"]}, "https://lab.example/robots/": {"token": "x"}}
-    file.write_text(json.dumps({"gateways": logins}))
-    file.chmod(0o600)
-
-    def complete_there(*words):
-        return complete(*words, environment={"XDG_CONFIG_HOME": str(tmp_path)})
-
-    for typed in "/", "/dev", "/devices/", "/devices/fo", "/devices/fox?service=rey":
-        assert complete_there("get", base + typed) == [guarded], typed
-    assert complete_there("get", base + "/devices/cr") == []
-    assert complete_there("get", guarded, "col") == ["color"]
-    assert complete_there("top", "") == [base + "/", "https://lab.example/robots/"]
-    assert complete_there("get", "http") == complete_there("top", "http") == [base + "/", "https://lab.example/robots/"]
-    assert base + "/" in complete_there("ls", "")
-    assert complete("top", "", environment={"XDG_CONFIG_HOME": "/nowhere"}) == []
-
-
 
 
 def test_check_config_warns_of_recordings_that_the_service_cannot_write(tmp_path_factory):
@@ -677,6 +725,41 @@ def test_what_is_not_there_is_told_in_time():
     assert Ran(["get", nobody, "a", "--timeout", "never"]).refused(NOT_UNDERSTOOD, "--timeout", "'never'")
 
 
+def test_a_device_that_its_gateway_does_not_reach_is_named(tmp_path):
+    nobody = f"rr+tcp://127.0.0.1:{free_port()}/?service=x"
+    with running(tmp_path, {"devices": [{"name": "relayed", "url": nobody}, {"name": "shared", "url": nobody, "mode": "shared"}]}) as gateway:
+        for name in "relayed", "shared":
+            gateway.wait_for("device offline", device=name)
+        for scheme in "http", "ws", "rr+ws":
+            base = f"{scheme}://127.0.0.1:{gateway.port}/devices"
+            for name in "relayed", "shared":
+                assert Ran(["get", f"{base}/{name}?service=x", "a"]).refused(
+                    UNREACHABLE, f": device '{name}' is offline: connect to ", ": Connection refused")
+            assert Ran(["get", f"{base}/unknown?service=x", "a"]).refused(UNREACHABLE, "no device 'unknown'")
+
+
+def test_a_device_with_users_of_its_own(tmp_path):
+    """Asked directly, and by a gateway that has no users."""
+    service, url = start_service(tmp_path)
+    url = url.replace("service=interop", "service=guarded")
+    right, wrong = ({"environment": {"RRGATE_PASSWORD": password}} for password in ("secret", "guess"))
+    alice = ["get", url, "level", "--user", "alice"]
+    try:
+        assert run(*alice, **right) == "1.5"
+        assert Ran(alice, **wrong).refused(REFUSED, "Authentication Failed")
+        assert Ran(alice).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
+        assert Ran(alice[:3]).refused(REFUSED, "Authentication Failed")
+        with running(tmp_path, {"devices": [{"name": "relayed", "url": url}, {"name": "shared", "url": url, "mode": "shared"}]}) as gateway:
+            for name in "relayed", "shared":
+                gateway.wait_for("device online", device=name)
+                there = f"http://127.0.0.1:{gateway.port}/devices/{name}?service=guarded"
+                refusal = Ran(["get", there, "level", "--user", "alice"], **right)
+                assert refusal.refused(REFUSED, "Authentication Failed; the login was for the gateway, and the device wants one of its own")
+                assert "the login" not in Ran(["get", there, "level"]).error
+    finally:
+        service.stop()
+
+
 def test_logins_and_rights_of_a_gateway(guarded):
     def as_user(name, password=None):
         return {"given": "", "environment": {"RRGATE_PASSWORD": password or PASSWORDS[name]}}
@@ -749,41 +832,6 @@ def test_a_gateway_for_one_device_needs_no_file(reynard, tmp_path):
     finally:
         proxy.stop()
     assert Ran(["proxy", reynard, "--name", "a/b"]).refused(NOT_UNDERSTOOD, "'a/b'")
-def test_a_device_that_its_gateway_does_not_reach_is_named(tmp_path):
-    nobody = f"rr+tcp://127.0.0.1:{free_port()}/?service=x"
-    with running(tmp_path, {"devices": [{"name": "relayed", "url": nobody}, {"name": "shared", "url": nobody, "mode": "shared"}]}) as gateway:
-        for name in "relayed", "shared":
-            gateway.wait_for("device offline", device=name)
-        for scheme in "http", "ws", "rr+ws":
-            base = f"{scheme}://127.0.0.1:{gateway.port}/devices"
-            for name in "relayed", "shared":
-                assert Ran(["get", f"{base}/{name}?service=x", "a"]).refused(
-                    UNREACHABLE, f": device '{name}' is offline: connect to ", ": Connection refused")
-            assert Ran(["get", f"{base}/unknown?service=x", "a"]).refused(UNREACHABLE, "no device 'unknown'")
-
-
-def test_a_device_with_users_of_its_own(tmp_path):
-    """Asked directly, and by a gateway that has no users."""
-    service, url = start_service(tmp_path)
-    url = url.replace("service=interop", "service=guarded")
-    right, wrong = ({"environment": {"RRGATE_PASSWORD": password}} for password in ("secret", "guess"))
-    alice = ["get", url, "level", "--user", "alice"]
-    try:
-        assert run(*alice, **right) == "1.5"
-        assert Ran(alice, **wrong).refused(REFUSED, "Authentication Failed")
-        assert Ran(alice).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
-        assert Ran(alice[:3]).refused(REFUSED, "Authentication Failed")
-        with running(tmp_path, {"devices": [{"name": "relayed", "url": url}, {"name": "shared", "url": url, "mode": "shared"}]}) as gateway:
-            for name in "relayed", "shared":
-                gateway.wait_for("device online", device=name)
-                there = f"http://127.0.0.1:{gateway.port}/devices/{name}?service=guarded"
-                refusal = Ran(["get", there, "level", "--user", "alice"], **right)
-                assert refusal.refused(REFUSED, "Authentication Failed; the login was for the gateway, and the device wants one of its own")
-                assert "the login" not in Ran(["get", there, "level"]).error
-    finally:
-        service.stop()
-
-
 
 
 def test_a_gateway_for_one_device_logs_in_there(tmp_path):
