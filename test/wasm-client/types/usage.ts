@@ -4,7 +4,7 @@ import type { Complex, RemoteObject, RrValue, SubscriptionState } from "rrgate-c
 import * as react from "rrgate-client/react";
 import * as svelte from "rrgate-client/svelte";
 import * as vue from "rrgate-client/vue";
-import type { SimulatedCreate } from "generated/create.js";
+import type { SensorPacket, SimulatedCreate } from "generated/create.js";
 import type * as declared from "generated/interop.js";
 import { Color } from "generated/interop_module.js";
 import * as words from "generated/words_module.js";
@@ -169,6 +169,36 @@ export async function follow(): Promise<void> {
   const run: number | undefined = enums.Mode?.run;
   void run;
   void far;
+}
+
+/** What hooks, composables and stores give has the types of the members. */
+export function show(): void {
+  const url = "ws://localhost/?service=interop";
+  const device = react.useDevice<declared.Interop>(url);
+  const vueDevice = vue.useDevice<declared.Interop>(url);
+  const subscription = subscribe<declared.Interop>(url);
+  type Shifted = Promise<declared.Pose | null>;
+  const call = react.useCall(device, "shift");
+  same<ReturnType<typeof call.call>, Shifted>(true);
+  same<typeof call.value, declared.Pose | null | undefined>(true);
+  const vueCall = vue.useCall(vueDevice, "shift");
+  same<ReturnType<typeof vueCall.call>, Shifted>(true);
+  same<typeof vueCall.state.value.value, declared.Pose | null | undefined>(true);
+  same<ReturnType<ReturnType<typeof svelte.callStore<declared.Interop, "shift">>["call"]>, Shifted>(true);
+  const store = svelte.callStore(subscription, "shift").getSnapshot();
+  same<typeof store.value, declared.Pose | null | undefined>(true);
+  const { value } = react.useProperty(device, "p_double");
+  same<typeof value, number | undefined>(true);
+  const { state } = vue.useProperty(vueDevice, "p_double");
+  same<typeof state.value.value, number | undefined>(true);
+  const wire = react.useWire(react.useDevice<SimulatedCreate>(url), "packets");
+  same<typeof wire.value, SensorPacket | null | undefined>(true);
+  const vueWire = vue.useWire(vue.useDevice<SimulatedCreate>(url), "packets");
+  same<typeof vueWire.value.value, SensorPacket | null | undefined>(true);
+  react.useEvent(device, "changed", (value, why) => same<[typeof value, typeof why], [number, string]>(true));
+  vue.useEvent(vueDevice, "changed", (value, why) => same<[typeof value, typeof why], [number, string]>(true));
+  const any = react.useCall(react.useDevice(url), "Drive");
+  same<typeof any.value, RrValue | undefined>(true);
 }
 
 /** What a property of a store is set to has the property's type. */

@@ -13,6 +13,7 @@ import type {
   PropertyLike,
   PropertyOptions,
   PropertyStore,
+  ReturnOf,
   SettableOf,
   Urls,
   ValueOf,
@@ -72,7 +73,7 @@ export function useEvent<T, K extends MembersLike<T, EventLike>>(
 export function useCall<T, K extends MembersLike<T, FunctionLike>>(
   { subscription }: DeviceState<T>,
   member: K,
-): MemberState<unknown> & Pick<CallStore<ParametersOf<T, K>, unknown>, "call"> {
+): MemberState<ReturnOf<T, K>> & Pick<CallStore<ParametersOf<T, K>, ReturnOf<T, K>>, "call"> {
   const store = useMemo(() => callStore(subscription, member), [subscription, member]);
   return { ...useStore(store), call: store.call };
 }

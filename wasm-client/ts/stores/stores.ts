@@ -14,6 +14,7 @@ import type {
   MembersLike,
   PacketOf,
   RemoteObject,
+  RrValue,
   WireLike,
   WireTime,
 } from "../types.js";
@@ -71,6 +72,15 @@ export type SettableOf<T, K> = string extends keyof T
   : K extends keyof T
     ? T[K] extends { set(value: infer S, ...args: never[]): Promise<void> }
       ? S
+      : never
+    : never;
+
+/** What the function `K` of `T` returns. */
+export type ReturnOf<T, K> = string extends keyof T
+  ? RrValue
+  : K extends keyof T
+    ? T[K] extends (...args: never[]) => Promise<infer R>
+      ? R
       : never
     : never;
 
@@ -231,9 +241,10 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
 export function callStore<T = RemoteObject, K extends MembersLike<T, FunctionLike> = MembersLike<T, FunctionLike>>(
   device: Subscription<T> | undefined,
   member: K,
-): CallStore<ParametersOf<T, K>, unknown> {
-  const store = new LiveStore<MemberState<unknown>>(idle, () => () => undefined);
-  const call = (...args: ParametersOf<T, K>) => ask(store, async () => (await connected(device, member))(...args));
+): CallStore<ParametersOf<T, K>, ReturnOf<T, K>> {
+  type V = ReturnOf<T, K>;
+  const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => () => undefined);
+  const call = (...args: ParametersOf<T, K>) => ask<V>(store, async () => (await connected(device, member))(...args));
   return Object.assign(store, { call });
 }
 

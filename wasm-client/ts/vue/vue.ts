@@ -12,6 +12,7 @@ import type {
   ParametersOf,
   PropertyLike,
   PropertyOptions,
+  ReturnOf,
   SettableOf,
   Urls,
   ValueOf,
@@ -90,8 +91,8 @@ export function useCall<T, K extends MembersLike<T, FunctionLike>>(
   device: Device<T>,
   member: K,
 ): {
-  readonly state: Readonly<ShallowRef<MemberState<unknown>>>;
-  call: (...args: ParametersOf<T, K>) => Promise<unknown>;
+  readonly state: Readonly<ShallowRef<MemberState<ReturnOf<T, K>>>>;
+  call: (...args: ParametersOf<T, K>) => Promise<ReturnOf<T, K>>;
 } {
   const { store, value } = useStores(device, (subscription) => callStore(subscription, member));
   return { state: value, call: (...args) => store.value.call(...args) };
