@@ -66,9 +66,12 @@ class TypeScriptEmitter {
   void emit_definition(const ServiceDefinition& definition);
   void emit_enum(const ServiceDefinition& definition, const EnumDefinition& item);
   void emit_exception(const ServiceDefinition& definition, const ExceptionDefinition& item);
-  void emit_entity(const EntityDefinition& item);
-  void emit_object(const EntityDefinition& item);
+  void emit_entity(const ServiceDefinition& definition, const EntityDefinition& item);
+  void emit_object(const ServiceDefinition& definition, const EntityDefinition& item);
   void emit_constants(const std::string& name, const EntityDefinition& item);
+  /// What `$.constants` gives: those of the definition and of the type, which count where both have one of a name.
+  std::string constants_text(const ServiceDefinition& definition, const EntityDefinition& item);
+  std::string constant_text(const ConstantDefinition& item, std::span<const ConstantDefinition> scope, int& budget);
   std::string member_type(const MemberDefinition& member);
   std::string objref_type(const TypeDefinition& type);
 
@@ -151,7 +154,7 @@ void TypeScriptEmitter::emit_definition(const ServiceDefinition& definition) {
   }
   for (const auto& item : definition.enums) emit_enum(definition, item);
   for (const auto& item : definition.exceptions) emit_exception(definition, item);
-  for (const auto& item : definition.entities) emit_entity(item);
+  for (const auto& item : definition.entities) emit_entity(definition, item);
 }
 
 void TypeScriptEmitter::emit_enum(const ServiceDefinition& definition, const EnumDefinition& item) {
@@ -194,13 +197,13 @@ void TypeScriptEmitter::emit_exception(const ServiceDefinition& definition, cons
   out_.gap();
 }
 
-void TypeScriptEmitter::emit_entity(const EntityDefinition& item) {
+void TypeScriptEmitter::emit_entity(const ServiceDefinition& definition, const EntityDefinition& item) {
   const auto& name = names_.at(item.qualified_name);
   if (flavour_ == TypeScriptFlavour::module) emit_constants(name, item);
   out_.documentation(item.documentation);
   out_.open("export interface " + name + " {");
   if (item.kind == EntityKind::object) {
-    emit_object(item);
+    emit_object(definition, item);
   } else {
     for (const auto& field : item.members) {
       out_.documentation(field.documentation);
@@ -222,8 +225,9 @@ void TypeScriptEmitter::emit_constants(const std::string& name, const EntityDefi
   out_.close("});");
 }
 
-void TypeScriptEmitter::emit_object(const EntityDefinition& item) {
-  std::string info = from_client("ObjectInfo");
+void TypeScriptEmitter::emit_object(const ServiceDefinition& definition, const EntityDefinition& item) {
+  std::string info =
+      from_client("ObjectInfo") + "<" + names_.at(item.qualified_name) + ", " + constants_text(definition, item) + ">";
   for (const auto& member : item.members)
     if (contains(implicit_names, member.name))
       info = "{ member(name: \"" + member.name + "\"): " + member_type(member) + " } & " + info;
@@ -233,6 +237,32 @@ void TypeScriptEmitter::emit_object(const EntityDefinition& item) {
     out_.documentation(member.documentation);
     out_.line("readonly " + member.name + ": " + member_type(member) + ";");
   }
+}
+
+std::string TypeScriptEmitter::constants_text(const ServiceDefinition& definition, const EntityDefinition& item) {
+  std::map<std::string, std::string> types;
+  for (const auto& scope : {all_constants(definition), all_constants(item)})
+    for (const auto& constant : scope) {
+      int budget = 100;
+      types[constant.name] = constant_text(constant, scope, budget);
+    }
+  std::vector<std::string> fields;
+  for (const auto& [name, type] : types) fields.push_back("readonly " + name + ": " + type);
+  return fields.empty() ? "{}" : "{ " + joined(fields, "; ") + " }";
+}
+
+/// Struct constants may share others again and again: what is written out is bounded.
+std::string TypeScriptEmitter::constant_text(const ConstantDefinition& item, std::span<const ConstantDefinition> scope,
+                                             int& budget) {
+  if (!is_struct_constant(item)) return type_text(item.type, Way::received);
+  if (--budget < 0) return from_client("RrValue");
+  std::vector<std::string> fields;
+  const auto value = value_of(item);
+  if (const auto* parts = std::get_if<std::vector<ConstantField>>(&value.data))
+    for (const auto& [name, constant] : *parts)
+      for (const auto& target : scope)
+        if (target.name == constant) fields.push_back("readonly " + name + ": " + constant_text(target, scope, budget));
+  return fields.empty() ? "{}" : "{ " + joined(fields, "; ") + " }";
 }
 
 std::string TypeScriptEmitter::member_type(const MemberDefinition& member) {

@@ -1,7 +1,8 @@
 // Callbacks: the service asks, a handler answers.
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
-import type { RemoteObject, RrValue } from "../../wasm-client/dist/node.js";
+import type { RrValue } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.callback
 stdver 0.10
@@ -15,7 +16,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 const ask = (what = "apple", count = 2) => robot["ask_price"]!(what, count);
 
 beforeEach(async () => {

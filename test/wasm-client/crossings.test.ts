@@ -1,7 +1,7 @@
 // How often reading a value crosses between JavaScript and WebAssembly: a number that does not grow with its fields.
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { JsReader } from "../../wasm-client/ts/js_reader.js";
 import { connect, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.crossings
 stdver 0.10
@@ -50,7 +50,7 @@ const position = { x: 1, y: 2, z: 3 };
 const calls: string[] = [];
 /** Of JavaScript's side. */
 let imported: Set<string>;
-let robot: RemoteObject;
+let robot: NamedObject;
 
 beforeEach(async () => {
   const service = await TestService.start({ definitions: [definition], root: "test.crossings.Root" });

@@ -1,6 +1,6 @@
 // What a service definition declares, at run time: values of constants and enums, schemas, documentation.
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const library = `service test.library
 stdver 0.10
@@ -56,7 +56,7 @@ object Robot
   function Mode echo(Mode mode)
 end`;
 
-let robot: RemoteObject;
+let robot: NamedObject;
 const start = async (definitions = [library, definition], root = "test.definition.Robot") => {
   const service = await TestService.start({ definitions, root });
   robot = await service.connect();

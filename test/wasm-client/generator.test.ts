@@ -1,7 +1,7 @@
 // Generator functions: steps in order, and every way to their end.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.generator
 stdver 0.10
@@ -16,7 +16,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 
 beforeEach(async () => {
   service = await TestService.start({ definitions: [definition], root: "test.generator.Root" });

@@ -2,8 +2,8 @@
 import { readdirSync, readFileSync } from "node:fs";
 import { Core, Info } from "../../wasm-client/dist/internal.js";
 import { ErrorCode, lease, RobotRaconteurError } from "../../wasm-client/dist/node.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.lease
 stdver 0.10
@@ -17,7 +17,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 beforeEach(async () => {
   service = await TestService.start({ definitions: [definition], root: "test.lease.Root" });
   robot = await service.connect();

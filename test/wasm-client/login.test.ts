@@ -1,7 +1,8 @@
 // Users and locks.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
+import type { ConnectOptions } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.login
 stdver 0.10
@@ -14,7 +15,7 @@ object Root
   function string who()
 end`;
 
-let robot: RemoteObject;
+let robot: NamedObject;
 const start = async (requireUser: boolean, options: ConnectOptions = {}) => {
   const service = await TestService.start({ definitions: [definition], root: "test.login.Root", requireUser });
   return (robot = await service.connect(options));
@@ -59,7 +60,7 @@ it("locks an object, where a user has logged in", async () => {
   await robot.$.lock();
   expect((await failure(robot.$.lock("client"))).code).toBe(ErrorCode.ObjectLockedError);
   await robot.$.unlock();
-  const part = (await robot["part"]!.get()) as unknown as RemoteObject;
+  const part = (await robot["part"]!.get()) as unknown as NamedObject;
   await part.$.lock("client");
   await part.$.unlock();
   expect((await failure(robot.$.lock("mine" as never))).message).toContain('found "mine"');

@@ -1,7 +1,8 @@
 // Members of objects as an application uses them.
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
-import type { RemoteObject, RrValue, WireConnection } from "../../wasm-client/dist/node.js";
+import type { RrValue, WireConnection } from "../../wasm-client/dist/node.js";
 import { connect, failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.members
 stdver 0.10
@@ -55,7 +56,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 
 const start = async () => {
   service = await TestService.start({ definitions: [definition], root: "test.members.Root" });
@@ -231,7 +232,7 @@ describe("events", () => {
   });
 
   it("end with the object that the service replaces", async () => {
-    const head = await m("head").get<RemoteObject>();
+    const head = await m("head").get<NamedObject>();
     const touched = head["touched"]!;
     const loop = (async () => {
       for await (const _ of touched);
@@ -393,15 +394,15 @@ describe("wires", () => {
 
 describe("object references", () => {
   it("lead to objects, by number, by text and without index", async () => {
-    const head = await m("head").get<RemoteObject>();
+    const head = await m("head").get<NamedObject>();
     expect(head.$.path).toBe("test.head");
     expect(head.$.type).toBe("test.members.Part");
     await head["size"]!.set(2);
     expect(await head["size"]!.get()).toBe(2);
     expect(await (await m("parts").get(-5))["name"]!.get()).toBe("parts -5");
     expect(await (await m("named").get("right hand ü."))["name"]!.get()).toBe("named right hand ü.");
-    const inner = await head["inner"]!.get<RemoteObject>();
-    expect((await inner["inner"]!.get<RemoteObject>()).$.path).toBe("test.head.inner.inner");
+    const inner = await head["inner"]!.get<NamedObject>();
+    expect((await inner["inner"]!.get<NamedObject>()).$.path).toBe("test.head.inner.inner");
   });
 
   it("give the same object for the same path", async () => {
@@ -423,7 +424,7 @@ describe("object references", () => {
   it("are looked up with limits that are nobody else's", async () => {
     const ended = new AbortController();
     const limited = failure(m("parts").get(3, { signal: ended.signal }));
-    const usual: Promise<RemoteObject> = m("parts").get(3);
+    const usual: Promise<NamedObject> = m("parts").get(3);
     ended.abort(new Error("enough"));
     expect((await limited).message).toBe("enough");
     expect((await usual).$.path).toBe("test.parts[3]");
@@ -433,26 +434,26 @@ describe("object references", () => {
 
   it("know when the service has replaced an object that was looked up with limits", async () => {
     const { signal } = new AbortController();
-    const head = await m("head").get<RemoteObject>({ signal });
+    const head = await m("head").get<NamedObject>({ signal });
     await m("release")("test.head");
     expect(head.$.state).toBe("released");
-    const usual = await m("head").get<RemoteObject>();
-    const limited = await m("head").get<RemoteObject>({ timeout: 5_000 });
+    const usual = await m("head").get<NamedObject>();
+    const limited = await m("head").get<NamedObject>({ timeout: 5_000 });
     await m("release")("test.head");
     expect([usual.$.state, limited.$.state]).toEqual(["released", "released"]);
-    expect((await m("head").get<RemoteObject>({ signal })).$.state).toBe("connected");
+    expect((await m("head").get<NamedObject>({ signal })).$.state).toBe("connected");
   });
 
   it("know when the service has replaced an object", async () => {
-    const head = await m("head").get<RemoteObject>();
-    const inner = await head["inner"]!.get<RemoteObject>();
+    const head = await m("head").get<NamedObject>();
+    const inner = await head["inner"]!.get<NamedObject>();
     const told: unknown[] = [];
     inner.$.onClose((reason) => told.push(reason?.message));
     await m("release")("test.head");
     expect(head.$.state).toBe("released");
     expect(told).toEqual(['the service released object "test.head.inner": look it up again']);
     expect((await failure(head["size"]!.get())).code).toBe(ErrorCode.ObjectNotFound);
-    const again = await m("head").get<RemoteObject>();
+    const again = await m("head").get<NamedObject>();
     expect(again).not.toBe(head);
     expect(await again["size"]!.get()).toBe(0);
     expect(robot.$.state).toBe("connected");

@@ -1,7 +1,7 @@
 // Memories: parts of arrays, with one dimension and with more.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.memory
 stdver 0.10
@@ -12,7 +12,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 
 beforeEach(async () => {
   service = await TestService.start({ definitions: [definition], root: "test.memory.Root" });

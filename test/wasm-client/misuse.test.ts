@@ -1,8 +1,8 @@
 // Slips of those who call: each is told at once, and disturbs nothing else.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
 import { platform } from "../../wasm-client/dist/internal.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { connect, failure, subscribe, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.misuse
 stdver 0.10
@@ -18,7 +18,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 beforeEach(async () => {
   service = await TestService.start({ definitions: [definition], root: "test.misuse.Root" });
   robot = await service.connect();

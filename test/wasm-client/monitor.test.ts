@@ -1,7 +1,7 @@
 // Monitors: two clients that take turns at an object. Time is made by hand.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.monitor
 stdver 0.10
@@ -10,13 +10,13 @@ object Root
   function string who()
 end`;
 
-let first: RemoteObject;
-let second: RemoteObject;
+let first: NamedObject;
+let second: NamedObject;
 /** What happened, in order. */
 let log: string[];
 
 /** Enters and stays until the returned function is called, which tells how it ended. */
-async function hold(robot: RemoteObject, name: string): Promise<() => Promise<void>> {
+async function hold(robot: NamedObject, name: string): Promise<() => Promise<void>> {
   let leave!: () => void;
   let left!: Promise<void>;
   await new Promise<void>((entered, refused) => {

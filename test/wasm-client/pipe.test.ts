@@ -1,7 +1,8 @@
 // Pipes: packets in order, none lost, and what ends an endpoint.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { PipeEndpoint, RemoteObject, RrValue } from "../../wasm-client/dist/node.js";
+import type { PipeEndpoint, RrValue } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.pipe
 stdver 0.10
@@ -24,7 +25,7 @@ object Root
 end`;
 
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 const open = (pipe: string, ...args: [number?]): Promise<PipeEndpoint> => robot[pipe]!.connect(args[0] ?? -1);
 
 /** The next packets. */
@@ -228,7 +229,7 @@ it("ends without error when the session is closed here", async () => {
 
 it("ends with its object", async () => {
   const part = await robot["part"]!.get(undefined);
-  const endpoint = await (part as unknown as RemoteObject)["echo"]!.connect(-1);
+  const endpoint = await (part as unknown as NamedObject)["echo"]!.connect(-1);
   service.release("test.part");
   await settle();
   expect(endpoint.isClosed).toBe(true);

@@ -23,7 +23,13 @@ import { readFileSync } from "node:fs";
 import * as page from "../../wasm-client/dist/node.js";
 import { JsValues } from "../../wasm-client/dist/internal.js";
 import type { CoreExports, Handle } from "../../wasm-client/dist/internal.js";
-import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
+import type {
+  ConnectOptions,
+  DynamicMember,
+  ObjectInfo,
+  OpenTransport,
+  TransportListener,
+} from "../../wasm-client/dist/node.js";
 
 /* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 interface WasmService extends CoreExports {
@@ -61,6 +67,9 @@ export interface ServiceOptions {
   /** The service's bytes arrive in pieces of this size. */
   pieces?: number;
 }
+
+/** An object whose members these tests know: each is said to be there (`robot["speed"]!`). */
+export type NamedObject = { readonly $: ObjectInfo } & Readonly<Record<string, DynamicMember>>;
 
 export class TestService {
   /** What the client sent, one item a frame. */
@@ -106,7 +115,7 @@ export class TestService {
     return new TestService(this.values, this.service, this.options, this.clients);
   }
 
-  connect(options: ConnectOptions = {}): Promise<RemoteObject> {
+  connect(options: ConnectOptions = {}): Promise<NamedObject> {
     return connect("ws://test.example/?service=test", { transport: this.transport, ...options });
   }
 

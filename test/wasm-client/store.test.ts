@@ -1,7 +1,8 @@
 // Subscriptions as pages hold them: their state, values and events over connections, and the end of all that is held.
-import type { Client, OpenTransport, RemoteObject, RrValue, SubscriptionState } from "../../wasm-client/dist/node.js";
+import type { Client, OpenTransport, RrValue, SubscriptionState } from "../../wasm-client/dist/node.js";
 import { ValueStore } from "../../wasm-client/ts/store.js";
 import { settle, subscribe, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.store
 stdver 0.10
@@ -28,7 +29,7 @@ function inTurn(...services: TestService[]): OpenTransport {
 }
 
 const follow = (transport: OpenTransport) =>
-  subscribe<RemoteObject>("ws://one/?service=test", { transport, firstRetry: 20, random: () => 1 });
+  subscribe<NamedObject>("ws://one/?service=test", { transport, firstRetry: 20, random: () => 1 });
 
 async function until(is: () => boolean): Promise<void> {
   await vi.waitUntil(is, { interval: 1 });
@@ -177,7 +178,7 @@ it("says what is no event", async () => {
 
 it("ends with the block that holds it", async () => {
   const service = await start();
-  let client: Client<RemoteObject>;
+  let client: Client<NamedObject>;
   {
     await using subscription = follow(inTurn(service));
     client = await subscription.client();

@@ -1,8 +1,9 @@
 // Subscriptions: connections come and go, the waits between are in the hands of the test.
 import { ErrorCode, findServices, RobotRaconteurError } from "../../wasm-client/dist/node.js";
-import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/node.js";
+import type { Clock, OpenTransport, SubscribeOptions } from "../../wasm-client/dist/node.js";
 import { Core } from "../../wasm-client/dist/internal.js";
 import { failure, settle, subscribe, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.subscribe
 stdver 0.10
@@ -60,7 +61,7 @@ function inTurn(...services: (TestService | Error)[]): OpenTransport {
 
 let clock: ManualClock;
 const follow = (transport: OpenTransport, options: SubscribeOptions = {}) =>
-  subscribe<RemoteObject>(url, { transport, clock, random: () => 0.5, ...options });
+  subscribe<NamedObject>(url, { transport, clock, random: () => 0.5, ...options });
 
 beforeEach(() => {
   clock = new ManualClock();

@@ -1,14 +1,15 @@
 // Sessions recorded between a client and a service of the reference (1.2.8), replayed with this client: what it sends
 // must be what the reference sent, byte for byte, and it must understand the answers.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
-import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
+import type { ConnectOptions } from "../../wasm-client/dist/node.js";
 import { Replay } from "./replay.js";
 import { connect, failure, settle } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const withoutTable: ConnectOptions = { stringTable: false };
 const version2: ConnectOptions = { version: 2 };
 
-async function replay(name: string, options: ConnectOptions): Promise<{ robot: RemoteObject; transcript: Replay }> {
+async function replay(name: string, options: ConnectOptions): Promise<{ robot: NamedObject; transcript: Replay }> {
   const transcript = new Replay(name);
   const robot = await connect("ws://127.0.0.1/?service=station", {
     transport: transcript.open,
@@ -107,7 +108,7 @@ it.each([
 ])("%s: object references", async (name, options) => {
   const { robot, transcript } = await replay(name, options);
   const m = (member: string) => robot[member]!;
-  const head = await m("head").get<RemoteObject>();
+  const head = await m("head").get<NamedObject>();
   expect(await head["size"]!.get()).toBe(4);
   await head["size"]!.set(3);
   expect(await head["identify"]!()).toBe("part head");
@@ -115,7 +116,7 @@ it.each([
   expect(await (await m("parts").get(-1))["identify"]!()).toBe("part #-1");
   expect(await (await m("named").get("a b[1]/.-_%"))["identify"]!()).toBe("part a b[1]/.-_%");
   expect((await failure(m("named").get("none"))).code).toBe(ErrorCode.InvalidArgument);
-  expect(await (await m("anything").get<RemoteObject>())["identify"]!()).toBe("part any");
+  expect(await (await m("anything").get<NamedObject>())["identify"]!()).toBe("part any");
   await robot.$.close();
   expectSameBytes(transcript);
 });

@@ -1,7 +1,7 @@
 // Every type of value, there and back, in every version of the message format.
 import { rrValue, typeOf } from "../../wasm-client/dist/node.js";
-import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 
 const definition = `service test.values
 stdver 0.10
@@ -131,7 +131,7 @@ const text = definition.replace("TYPES", types.map((type) => `property ${type} $
 
 async function service(
   options: { version?: 2 | 4; stringTable?: boolean; pieces?: number } = {},
-): Promise<RemoteObject> {
+): Promise<NamedObject> {
   return (await TestService.start({ definitions: [text], root: "test.values.Root", ...options })).connect();
 }
 

@@ -2,9 +2,10 @@
 // rrgate-client, the tests of that say (vitest.config.ts); how the worker treats a page that is busy, worker_host.test.ts.
 import { Core, RemoteCore } from "../../wasm-client/dist/internal.js";
 import * as page from "../../wasm-client/dist/node.js";
-import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
+import type { ConnectOptions } from "../../wasm-client/dist/node.js";
 import * as worker from "../../wasm-client/dist/worker.js";
 import { failure, settle, TestService } from "./service.js";
+import type { NamedObject } from "./service.js";
 import { connect } from "./thread_in_place.js";
 
 const definition = `service test.worker
@@ -32,7 +33,7 @@ end`;
 
 const url = "ws://test.example/?service=test";
 let service: TestService;
-let robot: RemoteObject;
+let robot: NamedObject;
 const start = async (options: ConnectOptions = {}) => {
   service = await TestService.start({ definitions: [definition], root: "test.worker.Root" });
   return connect(url, { transport: service.transport, ...options });
@@ -85,7 +86,7 @@ it("takes the fields of an instance, not what its class computes", async () => {
 
 it("finds objects by any index, as the core writes it", async () => {
   for (const index of ["left", "a.b[c]", "grün %", "0"]) {
-    const found = (await robot["named"]!.get(index)) as RemoteObject;
+    const found = (await robot["named"]!.get(index)) as NamedObject;
     expect(await found["name"]!.get()).toBe(`named ${index}`);
     expect(await robot.$.find(found.$.path)).toBe(found);
   }

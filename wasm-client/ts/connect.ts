@@ -44,7 +44,10 @@ const defaultConnectTimeout = 30_000;
 const defaultRequestTimeout = 15_000;
 
 /** A root object; `await using` ends its session. */
-export type Client<T> = T & { readonly $: ObjectInfo } & AsyncDisposable;
+export type Client<T> = T & { readonly $: InfoOf<T> } & AsyncDisposable;
+
+/** Of generated types their own. */
+type InfoOf<T> = T extends { readonly $: infer I extends ObjectInfo } ? I : ObjectInfo<T>;
 
 /** What stays from one connection of a subscription to the next. */
 export interface Memory {

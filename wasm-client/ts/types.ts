@@ -143,8 +143,11 @@ export interface SessionStats {
 /** "released": the service replaced this object; look it up again. */
 export type ObjectState = "connected" | "released" | "closed";
 
-/** What belongs to the connection and not to the object's own members; under `$`, which no member can be called. */
-export interface ObjectInfo {
+/**
+ * What belongs to the connection and not to the object's own members; under `$`, which no member can be called.
+ * `T`: the object's type, `C`: the constants of its type and of the definition that it stands in.
+ */
+export interface ObjectInfo<T = RemoteObject, C = DefinitionInfo["constants"]> {
   readonly state: ObjectState;
   /** Qualified type, "experimental.create.Create". */
   readonly type: string;
@@ -161,7 +164,7 @@ export interface ObjectInfo {
    * The constants of the object's type and of the definition that it stands in; the type's own count where both have one
    * of a name. Rejects with InvalidOperation where the session is closed.
    */
-  readonly constants: Promise<DefinitionInfo["constants"]>;
+  readonly constants: Promise<C>;
   /**
    * The constants, enums and types of a definition that the service has sent, with their documentation.
    * @param name  the definition's, "com.example.robot"; that of the object's type where not given.
@@ -175,7 +178,7 @@ export interface ObjectInfo {
    * that still waits to be sent arrives after it. By the name of a property its value is written, by that of a wire its OutValue:
    * `robot.$.urgent.speed(0)`.
    */
-  readonly urgent: Readonly<Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>>;
+  readonly urgent: UrgentCommands<T>;
   /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */
   member(name: string): DynamicMember;
   /**
@@ -392,13 +395,40 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   write(position: number | readonly number[], value: unknown, options?: CallOptions): Promise<void>;
 }
 
+/** Never there. What a compiler makes of a name of it tells whether it asks of each name whether it is there. */
+declare const names: { readonly [name: string]: true };
+
 /**
- * A connected object: its members by name, and `$`. `RemoteObject<"Drive" | "Bump">` has these for certain, also for a
- * compiler that asks of every other name whether it is there.
+ * What stands behind a name where no names are known: `T`. With `noUncheckedIndexedAccess` it would be `T | undefined`, and each
+ * call an error; `any` is the one type to which nothing is added.
  */
-export type RemoteObject<M extends string = string> = { readonly $: ObjectInfo } & {
-  readonly [member in M]: DynamicMember;
+// eslint-disable-next-line @typescript-eslint/no-explicit-any
+type ByName<T> = undefined extends typeof names.any ? any : T;
+
+/**
+ * A connected object: its members by name, and `$`. `RemoteObject<"Drive" | "Bump">` has these members alone; that also gives
+ * them types where `noUncheckedIndexedAccess` is on, with which those of a plain RemoteObject are `any`.
+ */
+export type RemoteObject<M extends string = string> = { readonly $: ObjectInfo<RemoteObject<M>> } & {
+  readonly [member in M]: string extends M ? ByName<DynamicMember> : DynamicMember;
 };
+
+type Commandable = ((...args: never[]) => Promise<unknown>) | { set: unknown } | { poke: unknown };
+type UrgentCommand<M> = M extends (...args: never[]) => Promise<unknown>
+  ? M
+  : M extends { set: infer S } | { poke: infer S }
+    ? S
+    : never;
+
+// eslint-disable-next-line @typescript-eslint/no-explicit-any
+type AnyCommand = (...args: any[]) => Promise<unknown>;
+
+/** The functions of `T`, and what writes its properties and wires. */
+export type UrgentCommands<T> = string extends keyof T
+  ? Readonly<Record<string, ByName<AnyCommand>>>
+  : {
+      readonly [K in keyof T as K extends "$" ? never : T[K] extends Commandable ? K : never]: UrgentCommand<T[K]>;
+    };
 
 /** The names of the members of `T` that are like `M`; of an object without known types every name. */
 export type MembersLike<T, M> = string extends keyof T

@@ -27,7 +27,7 @@ export interface Colour {
 }
 
 export interface Lamp {
-  readonly $: ObjectInfo;
+  readonly $: ObjectInfo<Lamp, { readonly most: number }>;
   readonly colour: Pick<PropertyMember<Colour | null>, "get">;
 }
 )";
@@ -84,7 +84,8 @@ TEST_CASE("generate: what only compat mode takes becomes code all the same") {
   CHECK_THAT(header, Contains("namespace test::class_ {") && Contains("inline constexpr std::int16_t A_B = 1;") &&
                          Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;"));
   CHECK_THAT(run_command("generate", {"ts", "--compat", file}).output,
-             Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;"));
+             Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;") &&
+                 Contains("readonly $: ObjectInfo<X, { readonly A_B: number }>;"));
 }
 
 TEST_CASE("generate ts: an enum without values has no names") {

@@ -1,6 +1,6 @@
 // What programs do with generated types. Compiled, never run: each line marked as an error must be one.
 import { connect, lease, listUsbDevices, requestUsbDevice, rrValue, subscribe } from "rrgate-client";
-import type { Complex, RemoteObject, RrValue, SubscriptionState } from "rrgate-client";
+import type { Complex, FunctionMember, RemoteObject, RrValue, SubscriptionState } from "rrgate-client";
 import * as react from "rrgate-client/react";
 import * as svelte from "rrgate-client/svelte";
 import * as vue from "rrgate-client/vue";
@@ -156,19 +156,73 @@ export async function follow(): Promise<void> {
 
   const dynamic = subscribe("ws://localhost/?service=any");
   for await (const value of dynamic.wire("anything")) same<typeof value, RrValue>(true);
-  for await (const [first] of dynamic.event("anything")) same<typeof first, RrValue | undefined>(true);
+  for await (const given of dynamic.event("anything")) same<typeof given, RrValue[]>(true);
   await dynamic.close();
+  // Every name may be a member where none is known.
+  const any = await connect("ws://localhost/?service=any");
+  await any.Drive(1, 2);
+  await any.level.set(await any.level.get());
+  any.Bump.on(() => any.$.urgent.Drive(0, 0));
+  any.ask.handler = () => 5;
+  const arm: RemoteObject = await any.arms.get("left");
+  for await (const value of arm.state.connect()) await (await arm.commands.connect()).send(value);
+  for await (const number of arm.count(3)) void number;
+  const later = await subscribe("ws://localhost/?service=any").client();
+  await later.Drive(1, 2, { timeout: 100 });
   // Members that are known by name need no "!" and no "?.".
   const named = await connect<RemoteObject<"Drive" | "Bump">>("ws://localhost/?service=any");
   await named.Drive(1, 2);
-  for await (const [side] of named.Bump) same<typeof side, RrValue | undefined>(true);
+  for await (const given of named.Bump) same<typeof given, RrValue[]>(true);
   // @ts-expect-error not one of them
   named.Fly;
+  await named.$.urgent.Drive(0, 0);
+  // @ts-expect-error not one of them
+  await named.$.urgent.Fly();
   const { constants, enums } = await named.$.definition();
-  same<typeof constants.LIMIT, RrValue | undefined>(true);
+  const limit: RrValue | undefined = constants.LIMIT;
   const run: number | undefined = enums.Mode?.run;
-  void run;
+  void [limit, run];
   void far;
+}
+
+/** Stops, and what a definition says, by the names that there are. */
+export async function stop(): Promise<void> {
+  const robot = await connect<SimulatedCreate>("ws://localhost/?service=Create");
+  await robot.$.urgent.Drive(0, 0, { timeout: 100 });
+  // @ts-expect-error misspelt
+  await robot.$.urgent.Drve(0, 0);
+  // @ts-expect-error a number is missing
+  await robot.$.urgent.Drive(0);
+  // @ts-expect-error an event is no command
+  robot.$.urgent.Bump;
+  // @ts-expect-error a readonly property is no command
+  robot.$.urgent.DistanceTraveled;
+  const { DRIVE_STRAIGHT } = await robot.$.constants;
+  same<typeof DRIVE_STRAIGHT, number>(true);
+  // @ts-expect-error misspelt
+  (await robot.$.constants).DRIVE_STRIGHT;
+
+  const object = await connect<words.Object_>("ws://localhost/?service=words");
+  const constants = await object.$.constants;
+  same<typeof constants.largest, bigint>(true);
+  same<typeof constants.three, Int16Array>(true);
+  same<typeof constants.both.second.third, number>(true);
+
+  const interop = await connect<declared.Interop>("ws://localhost/?service=interop");
+  await interop.$.urgent.p_double(3);
+  // @ts-expect-error not a number
+  await interop.$.urgent.p_double("fast");
+  const part = await interop.parts.get(3);
+  // @ts-expect-error misspelt
+  await part.$.urgent.identfy();
+  await using held = await lease(part);
+  void held;
+
+  // Also of types that are written by hand.
+  const own = await connect<{ readonly Drive: FunctionMember<[number], void> }>("ws://localhost/?service=any");
+  await own.$.urgent.Drive(0);
+  // @ts-expect-error misspelt
+  await own.$.urgent.Drve(0);
 }
 
 /** What hooks, composables and stores give has the types of the members. */

@@ -86,6 +86,8 @@ export function explain(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
+type Command = (...args: unknown[]) => Promise<unknown>;
+
 /** The last step's type, or that of the last argument, says that it is a generator. */
 export function isGenerator({ type, parameters }: Pick<Member, "type" | "parameters">): boolean {
   return [type, parameters.at(-1)?.type ?? ""].some((each) => each.endsWith("{generator}"));
@@ -119,7 +121,8 @@ export function remoteOf(
       underWay.follow((async () => member(name)(...args, ...(options ? [options] : [])))()),
     urgent: async (name, args, options) => {
       const declared = info.members.find((each) => each.name === name);
-      const urgent = declared?.kind === "function" && !isGenerator(declared) ? info.urgent[name] : undefined;
+      const isCallable = declared?.kind === "function" && !isGenerator(declared);
+      const urgent = isCallable ? (info.urgent[name] as Command | undefined) : undefined;
       if (!urgent) throw new Error(`${info.type} has no function "${name}" that can be called at once`);
       return urgent(...args, ...(options ? [options] : []));
     },
@@ -127,7 +130,7 @@ export function remoteOf(
     get: async (name) => member(name).get(),
     set: (name, value, options) => underWay.follow((async () => member(name).set(value, options))()),
     setNow: async (name, value, options) => {
-      const write = info.urgent[name];
+      const write = info.urgent[name] as Command | undefined;
       if (!write) throw new Error(`${info.type} has no property or wire "${name}" that can be written at once`);
       await write(value, ...(options ? [options] : []));
     },
