@@ -561,6 +561,21 @@ describe("a board", () => {
     expect(hasPreset(tool, definitions)).toBe(true);
   });
 
+  test("a camera's board has its settings: what there is, and the calls that read and change them", () => {
+    const type = "com.robotraconteur.imaging.Camera";
+    const members = [
+      memberOf("property", "com.robotraconteur.param.ParameterInfo{list}", "param_info"),
+      memberOf("function", "varvalue", "getf_param"),
+      memberOf("function", "void", "setf_param"),
+    ];
+    const { panels } = presetFor({ type, members, definitions, scope: "com.robotraconteur.imaging" });
+    expect(panels.map(({ kind, settings }) => [kind, settings])).toEqual([
+      ["streams", {}],
+      ["form", { members: ["setf_param", "getf_param"] }],
+      ["table", { member: "param_info" }],
+    ]);
+  });
+
   test("fits a type that implements a standard one, however it is named there, and calls nothing that stops nothing", () => {
     const driver = new Definitions([
       "service com.example.ur\nusing com.example.base.Arm as A\nobject UR5\nimplements A\nend",

@@ -77,6 +77,8 @@ const STANDARD: Readonly<Record<string, Preset>> = {
       ["form", 0, 12, 4, 7, { member: "trigger_mode" }],
       ["table", 4, 12, 4, 7, { member: "camera_info" }],
       ["streams", 8, 12, 4, 7],
+      ["form", 0, 19, 4, 8, { members: ["setf_param", "getf_param"] }, "Settings"],
+      ["table", 4, 19, 8, 8, { member: "param_info" }],
     ],
   },
   ["com.robotraconteur.robotics.tool.Tool"]: {

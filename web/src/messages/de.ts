@@ -245,6 +245,7 @@ const german: Readonly<Record<string, string>> = {
   Tool: "Werkzeug",
   "Tool of {0}": "Werkzeug von {0}",
   Streaming: "Strom",
+  Settings: "Einstellungen",
   Devices: "Geräte",
   "Asking the gateway for its devices": "Das Gateway wird nach seinen Geräten gefragt",
   "No devices configured": "Keine Geräte eingerichtet",
