@@ -36,3 +36,13 @@ test("a packet after the endpoint was closed, or could not be opened, goes to a 
   outlet.close();
   await vi.waitFor(() => expect(two.close).toHaveBeenCalledOnce());
 });
+
+test("whoever follows a wire gets what tells of its losses", async () => {
+  const connection = { losses: () => Promise.resolve(undefined), async *[Symbol.asyncIterator]() {} };
+  const info = { members: [{ name: "state" }], member: () => ({ connect: () => connection }) };
+  const opened = vi.fn();
+  await remoteOf({ $: info } as never)
+    .wire("state", new AbortController().signal, opened)
+    .next();
+  expect(opened).toHaveBeenCalledWith(connection);
+});

@@ -2,7 +2,7 @@
 // Layer: web/live.
 
 import { explain } from "../robot/remote";
-import type { Remote } from "../robot/remote";
+import type { Account, Remote } from "../robot/remote";
 import { Pace } from "./pace";
 import { pause } from "./pause";
 
@@ -20,6 +20,8 @@ export class Feed {
   readonly heard = new Set<Heard>();
   newest: unknown = undefined;
   failure: string | null = null;
+  /** Of the wire or pipe that is connected: what became of its values on their way. */
+  account: Account | null = null;
   #stop: AbortController | null = null;
 
   constructor(
@@ -63,8 +65,13 @@ export class Feed {
       return;
     }
     if (kind === "property") return this.#poll(signal);
-    const values = kind === "wire" ? object.wire(member, signal) : object.pipe(member, signal);
-    for await (const value of values) this.#take(value);
+    const opened = (account: Account): void => void (this.account = account);
+    const values = kind === "wire" ? object.wire(member, signal, opened) : object.pipe(member, signal, opened);
+    try {
+      for await (const value of values) this.#take(value);
+    } finally {
+      this.account = null;
+    }
     if (!signal.aborted) throw new Error("the device closed it");
   }
 

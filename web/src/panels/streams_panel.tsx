@@ -1,4 +1,5 @@
-// What this page follows: how often it comes, how old it is; and what the gateway lost on the way, where it keeps an account.
+// What this page follows: how often it comes, how old it is; and, where an account of it is kept, how long it waited on the way
+// and what was lost there.
 // Layer: web/panels.
 
 import { useEffect, useMemo } from "preact/hooks";
@@ -8,9 +9,15 @@ import { itemsOf } from "../gateway/polled_list";
 import { subscriptionsAt } from "../gateway/subscriptions";
 import { isUsb } from "../gateway/usb_devices";
 import { openFeeds } from "../live/feed";
+import type { Feed } from "../live/feed";
+import { pause } from "../live/pause";
 import { formatRate } from "../live/rate";
 import { oldness } from "../live/use_feed";
 import type { PanelProps } from "./panel";
+
+type Losses = Awaited<ReturnType<NonNullable<Feed["account"]>["losses"]>>;
+
+const ACCOUNT_MS = 3_000;
 
 export default function StreamsPanel({ place }: PanelProps) {
   useNow(250);
@@ -21,6 +28,7 @@ export default function StreamsPanel({ place }: PanelProps) {
     return () => list.stop();
   }, [list]);
   const lost = itemsOf(useStore(list.state)) ?? [];
+  const own = useOwnLosses();
   const now = performance.now();
   return (
     <div class="panel-scroll" tabIndex={0} role="group" aria-label={t("Streams")}>
@@ -30,6 +38,7 @@ export default function StreamsPanel({ place }: PanelProps) {
             <th scope="col">{t("Stream")}</th>
             <th scope="col">{t("Rate")}</th>
             <th scope="col">{t("Age")}</th>
+            <th scope="col">{t("Waited at the gateway")}</th>
             <th scope="col">{t("Replaced or dropped")}</th>
           </tr>
         </thead>
@@ -38,6 +47,7 @@ export default function StreamsPanel({ place }: PanelProps) {
             const age = feed.pace.ageMs(now);
             const account = lost.filter(({ member, kind }) => member === feed.member && kind === feed.kind);
             const missed = account.reduce((sum, { conflated, dropped }) => sum + conflated + dropped, 0);
+            const here = own.get(feed);
             return (
               <tr key={i} class={feed.pace.isStale(now) ? "is-old" : ""}>
                 <th scope="row">
@@ -45,7 +55,13 @@ export default function StreamsPanel({ place }: PanelProps) {
                 </th>
                 <td>{t("{0} a second", formatRate(feed.pace.rate(now)))}</td>
                 <td>{age === null ? "–" : oldness(age)}</td>
-                <td>{account.length === 0 ? "–" : t("{0} (all clients)", missed)}</td>
+                <td>{here ? t("half {0} ms, 99 % {1} ms", here.ageP50, here.ageP99) : "–"}</td>
+                <td>
+                  {[
+                    ...(here ? [t("{0} here", here.conflated + here.dropped)] : []),
+                    ...(account.length > 0 ? [t("{0} for all clients", missed)] : []),
+                  ].join(", ") || "–"}
+                </td>
               </tr>
             );
           })}
@@ -53,4 +69,25 @@ export default function StreamsPanel({ place }: PanelProps) {
       </table>
     </div>
   );
+}
+
+/** Of this page's own connections, asked again every few seconds. */
+function useOwnLosses(): WeakMap<Feed, Losses> {
+  const known = useMemo(() => new WeakMap<Feed, Losses>(), []);
+  useEffect(() => {
+    const stop = new AbortController();
+    const look = async (feed: Feed): Promise<void> => {
+      // One that fails tells nothing: the strip says why.
+      known.set(feed, await feed.account?.losses({ signal: stop.signal }).catch(() => undefined));
+    };
+    const follow = async (): Promise<void> => {
+      while (!stop.signal.aborted) {
+        if (!document.hidden) await Promise.all(openFeeds().map(look));
+        await pause(ACCOUNT_MS, stop.signal);
+      }
+    };
+    void follow();
+    return () => stop.abort();
+  }, []);
+  return known;
 }

@@ -11,6 +11,7 @@ import type {
   MemberInfo,
   MemberKind,
   RemoteObject,
+  WireConnection,
 } from "rrgate-client";
 
 import type { Control } from "./control";
@@ -19,6 +20,9 @@ import { UnderWay } from "./under_way";
 
 export type Member = MemberInfo;
 export type { MemberKind };
+
+/** Of the values of one connection, by the service. */
+export type Account = Pick<WireConnection, "losses">;
 
 /** A connected object of a device. */
 export interface Remote {
@@ -45,11 +49,11 @@ export interface Remote {
   set(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Writes a property, or pokes a wire, past whatever waits to be sent. */
   setNow(name: string, value: unknown, options?: CallOptions): Promise<void>;
-  /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
-  wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
+  /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. `opened`: what tells of them. */
+  wire(name: string, signal: AbortSignal, opened?: (account: Account) => void): AsyncGenerator<unknown, void>;
   poke(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** All packets of a new pipe endpoint; ends when the device closes it, with the connection or with `signal`. */
-  pipe(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
+  pipe(name: string, signal: AbortSignal, opened?: (account: Account) => void): AsyncGenerator<unknown, void>;
   /** Items of a memory in each dimension. */
   dimensions(memory: string): Promise<number[]>;
   read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
@@ -134,8 +138,8 @@ export function remoteOf(
       if (!write) throw new Error(`${info.type} has no property or wire "${name}" that can be written at once`);
       await write(value, ...(options ? [options] : []));
     },
-    wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
-    pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
+    wire: (name, signal, opened) => valuesOf(() => member(name).connect({ signal }), signal, opened),
+    pipe: (name, signal, opened) => valuesOf(() => member(name).connect(-1, { signal }), signal, opened),
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
     write: async (name, position, value) => member(name).write(position, value),
@@ -192,12 +196,17 @@ async function drop(packets: AsyncIterable<unknown>): Promise<void> {
   for await (const _ of packets);
 }
 
+type Stream = AsyncIterable<unknown> & Account;
+
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
 async function* valuesOf(
-  open: () => AsyncIterable<unknown> | Promise<AsyncIterable<unknown>>,
+  open: () => Stream | Promise<Stream>,
   signal: AbortSignal,
+  opened?: (account: Account) => void,
 ): AsyncGenerator<unknown, void> {
-  const values = (await open())[Symbol.asyncIterator]();
+  const stream = await open();
+  opened?.(stream);
+  const values = stream[Symbol.asyncIterator]();
   const stop = (): void => void values.return?.()?.catch(() => undefined); // closing what is already gone
   signal.addEventListener("abort", stop, { once: true });
   try {
