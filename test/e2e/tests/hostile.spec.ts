@@ -1,6 +1,7 @@
 // Names that JavaScript calls by itself, and texts and documentation full of HTML: no panel breaks, nothing runs.
 import { expect, test } from "../lab_test";
 import { addPanel } from "../board";
+import { PANEL_KINDS } from "../../../web/src/board/board";
 import { startPeer } from "../peers";
 import type { Peer } from "../peers";
 
@@ -30,7 +31,7 @@ test("every panel shows a hostile service, and runs nothing of it", async ({ pag
   await of("generator").getByRole("button", { name: "Run" }).click();
   await expect(of("generator").getByRole("list").getByText(html).first()).toBeVisible();
   await expect(of("generator").getByRole("status")).toHaveText("ended");
-  for (const kind of ["image", "pipe", "robot", "locks", "streams"]) {
+  for (const kind of ["image", "pipe", "robot", "trajectory", "locks", "streams"]) {
     await addPanel(page, kind);
     await expect(of(kind).locator(".panel-body")).not.toBeEmpty();
   }
@@ -48,6 +49,7 @@ test("every panel shows a hostile service, and runs nothing of it", async ({ pag
   await of("notes").getByRole("textbox", { name: "Notes", exact: true }).fill(html);
   await of("notes").getByLabel("Name of Notes").fill(html);
   await expect(page.getByRole("group", { name: html, exact: true })).toBeVisible();
+  for (const kind of PANEL_KINDS) await expect(of(kind)).toBeVisible();
   await page.getByRole("button", { name: "Done" }).click();
   await expect(page.locator('[data-kept="true"]')).toBeVisible();
   await page.reload();
