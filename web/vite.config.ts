@@ -1,5 +1,12 @@
 // Build of the dashboard: static files with hashed names, no inline script or style, so that the gateway can send
 // `script-src 'self' 'wasm-unsafe-eval'`. `npm run dev` talks to a gateway on RRGATE_URL (default 127.0.0.1:8080).
+//
+// The icons in public/*.png are pictures of icon.svg, for systems that take no SVG: 192 and 512 pixels wide and, on its own
+// background instead of none (d8eaf1ff for 00000000), 180 as apple-touch-icon.png. One is made so, then put into 12 colours:
+//   chromium --headless --hide-scrollbars --default-background-color=00000000 --window-size=192,192 \
+//     --screenshot=public/icon-192.png public/icon.svg
+//   python3 -c 'import sys; from PIL import Image; f = sys.argv[1]; Image.open(f).convert("RGBA").quantize(12).save(f, optimize=True)' \
+//     public/icon-192.png
 import { loadEnv } from "vite";
 import { defineConfig } from "vitest/config";
 import { licences, wasmNotices } from "../cmake/notices.mjs";

@@ -206,7 +206,17 @@ test.describe("with its service worker", () => {
     await page.goto(lab.url);
     const manifest = await page.request.get(`${lab.url}manifest.webmanifest`);
     expect(manifest.headers()["content-type"]).toContain("application/manifest+json");
-    expect(await manifest.json()).toMatchObject({ display: "standalone", start_url: "./" });
+    const { icons, ...rest } = (await manifest.json()) as { icons: { src: string; type: string; sizes: string }[] };
+    expect(rest).toMatchObject({ display: "standalone", start_url: "./" });
+    const apple = await page.locator('link[rel="apple-touch-icon"]').getAttribute("href");
+    const pictures = icons.filter(({ type }) => type === "image/png");
+    expect(pictures.map(({ sizes }) => sizes)).toEqual(["192x192", "512x512"]);
+    for (const { src, sizes } of [...pictures, { src: apple ?? "", sizes: "180x180" }]) {
+      const picture = await page.request.get(lab.url + src);
+      expect(picture.headers()["content-type"]).toBe("image/png");
+      const head = (await picture.body()).subarray(16, 24); // of its IHDR
+      expect(`${head.readUInt32BE(0)}x${head.readUInt32BE(4)}`).toBe(sizes);
+    }
     await page.evaluate(async () => void (await navigator.serviceWorker.ready));
     await context.setOffline(true);
     await page.reload();
