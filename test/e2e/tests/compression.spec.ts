@@ -26,18 +26,20 @@ function ask(url: string, headers: Record<string, string>): Promise<Answer> {
 }
 
 /** The page and all that it loads at once, by what its browser asked for. */
-async function filesOfPage(page: Page, url: string): Promise<string[]> {
+async function filesOfPage(page: Page, url: string, view: string, isThere: string): Promise<string[]> {
   const files = new Set<string>();
   page.on("request", (request) => {
     if (request.url().startsWith(url) && !request.url().includes("/api/")) files.add(request.url());
   });
-  await page.goto(`${url}#/devices/create/Create`);
+  await page.goto(`${url}#/devices/create/Create${view}`);
   await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await expect(page.locator(isThere).first()).toBeVisible();
+  await expect(page.locator(".panel-body:empty")).toHaveCount(0);
   return [...files].filter((file) => !file.includes("/devices/"));
 }
 
 test("the page comes compressed, with tags of its own, and in less than half of its bytes", async ({ page, lab }) => {
-  const files = await filesOfPage(page, lab.url);
+  const files = await filesOfPage(page, lab.url, "", "[data-pose]");
   expect(files.some((file) => file.endsWith(".wasm"))).toBe(true);
   const sizes = { identity: 0, gzip: 0, br: 0 };
   for (const file of files) {
@@ -65,6 +67,20 @@ test("the page comes compressed, with tags of its own, and in less than half of 
   expect(sizes.br).toBeLessThan(sizes.identity * 0.4);
   expect(sizes.gzip).toBeLessThan(sizes.identity * 0.5);
 });
+
+const views = [
+  // 23 kB of it are the plots.
+  { view: "?view=board", shows: '[data-panel="plot"] .freshness', never: /robot_page|scene_panel/, most: 225_000 },
+  { view: "?view=members", shows: '[data-member="Drive"]', never: /robot_page|board_page|_panel/, most: 180_000 },
+];
+for (const { view, shows, never, most } of views)
+  test(`${view} loads no part of another view, and less than ${most / 1000} kB`, async ({ page, lab }) => {
+    const files = await filesOfPage(page, lab.url, view, shows);
+    expect(files.filter((file) => never.test(file))).toEqual([]);
+    let size = 0;
+    for (const file of files) size += (await ask(file, { "accept-encoding": "br" })).body.length;
+    expect(size).toBeLessThan(most);
+  });
 
 test("the list of devices comes without the pages of boards and robots, in less than 65 kB of files that are no WebAssembly", async ({
   page,

@@ -46,6 +46,9 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   const first = useFirstView(link, route, drives);
   const shown = view === "auto" || (view === "drive" && !drives) ? first : view;
   const isDriven = shown === "drive";
+  // Kept from then on: what is under way on it goes on while another view is looked at.
+  const wasDriven = useRef(false);
+  wasDriven.current ||= isDriven;
   const width = shown === "members" || onlyStop ? "page-narrow" : `page-wide ${shown === "board" ? "page-wall" : ""}`;
   return (
     <div class={`page ${width}`}>
@@ -59,7 +62,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
       {link && (
         <HeadStop link={link} route={route} list={list} isShown={shown === "members" || (onlyStop && isDriven)} />
       )}
-      {drives && link && (
+      {drives && link && wasDriven.current && (
         <div hidden={!isDriven || onlyStop}>
           <LoadedRobot link={link} list={list} device={device} service={service} shown={isDriven && !onlyStop} />
         </div>
