@@ -77,6 +77,10 @@ def test_the_reference_has_every_option_and_command(site):
     assert "unused_session_ms" in text and "opaque_rate" in text
     assert "rrgate check-config" in (SITE / "reference/commands.html").read_text()
     assert (SITE / "reference/rrgate-client/functions/connect.html").exists()
+    exports = json.loads((ROOT / "wasm-client/package.json").read_text())["exports"]
+    entries = {name[2:] for name, target in exports.items() if isinstance(target, dict)} - {"", "inline", "worker-thread"}
+    assert {f"./{entry}/" for entry in entries} <= set(site["reference/rrgate-client/index.html"].links)
+    assert [entry for entry in entries if f"reference/rrgate-client/{entry}/index.html" not in site] == []
     for page, names in {"device": ["make_generator_handler", "class Node", "class Service"], "client": ["async_connect", "class RemoteObject"],
                         "subscribe": ["subscribe_service", "class Discovery"], "gateway": ["class EmbeddedGateway"],
                         "beast": ["make_beast_stream"], "values": ["struct NodeId"]}.items():
