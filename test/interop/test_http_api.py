@@ -1,12 +1,27 @@
+def test_a_memory_of_pods_is_read_in_parts(tmp_path):
+    device = Background([sys.executable, PEERS / "many_samples.py"], tmp_path / "device.log")
+    process, port = start_gateway(tmp_path, json.loads(device.next_line())["url"])
+    try:
+        memory = "/api/v1/devices/interop/device/samples"
+        whole = http_api.ask(port, "GET", memory)
+        assert (whole.status, whole.json["error"]["name"]) == (413, "RobotRaconteur.BufferLimitViolation")
+        part = http_api.ask(port, "GET", memory + "?offset=79998&count=2")
+        assert (part.status, part.json) == (200, [{"id": 0, "reading": [0] * 16}] * 2)
+    finally:
+        process.stop()
+        device.stop()
+
+
 """The objects of a device over plain HTTP, as curl would use them; the device is the reference and ours in turn."""
 import base64
 import functools
 import http.client
 import json
+import sys
 import threading
 import time
 
-from directions import DIRECTIONS, service_command
+from directions import DIRECTIONS, PEERS, service_command
 import http_api
 from http_api import BASE, schemathesis
 from processes import BUILD, Background, start_gateway

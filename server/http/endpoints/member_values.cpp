@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/member/memory.hpp"
 #include "core/types/multidim.hpp"
 
 namespace rrgate {
@@ -80,7 +81,7 @@ rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, co
     for (std::size_t i = 0; i < shape.size(); ++i) counts.push_back(shape[i] - std::min(at[i], shape[i]));
   }
   const auto wanted = rr::product_of(std::span<const std::uint64_t>(counts));
-  if (!wanted || *wanted > max_memory_bytes / std::max<std::size_t>(1, item_bytes_of(target)))
+  if (!wanted || *wanted > max_memory_bytes / rr::memory_item_size(*target.member, target.types()))
     refuse(rr::ErrorCode::buffer_limit_violation,
            "that are more than " + std::to_string(max_memory_bytes) + " bytes; ask for parts with offset and count");
   auto part = target.request(rr::CallKind::memory_read);
