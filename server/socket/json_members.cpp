@@ -94,10 +94,10 @@ JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, rr::JsonForm f
   const auto& member = expect_member(*target, "write", {rr::MemberKind::memory});
   expect_direction(member, rr::MemberDirection::readonly);
   const auto sizes = co_await memory_shape(*target);
-  auto part = target->request(rr::CallKind::memory_write);
-  part.range.position = request->numbers("offset", sizes.size()).value_or(Shape(sizes.size(), 0));
-  part.arguments.push_back(value_of(*request, *target, member.type, member.name, form));
-  co_await target->client->ask(std::move(part));
+  const auto offset = request->numbers("offset", sizes.size());
+  const auto count = request->numbers("count", sizes.size());
+  auto items = value_of(*request, *target, member.type, member.name, form);
+  co_await write_items(*target, sizes, offset, count, std::move(items));
   co_return nullptr;
 }
 

@@ -306,6 +306,8 @@ def test_users_and_locks(gateway):
             assert other.ask("call", "who") == "bob"
             page.ask("lock", kind="client")
             assert other.refusal("set", "level", value=3)[0] == "ObjectLockedError"
+    assert page.refusal("write", "m_numbers", offset=[3], count=[1], value=[9, 9])[0] == "InvalidArgument"
+    assert page.ask("read", "m_numbers", offset=[3], count=[2]) == [3, 4]
             page.ask("set", "level", value=2)
             page.ask("unlock")
             other.ask("set", "level", value=1.5)

@@ -7,6 +7,16 @@
 
 namespace rrgate {
 
+namespace {
+
+std::string shape_text(const Shape& shape) {
+  std::string out;
+  for (const auto items : shape) out += (out.empty() ? "" : " x ") + std::to_string(items);
+  return out;
+}
+
+}  // namespace
+
 std::string plain_documentation(std::string_view documentation) {
   std::string out;
   bool begins_line = true;
@@ -88,6 +98,20 @@ rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, co
   part.range.position = std::move(at);
   part.range.count = std::move(counts);
   co_return co_await target.client->ask(std::move(part));
+}
+
+rr::awaitable<void> write_items(const Target& target, const Shape& shape, const std::optional<Shape>& offset,
+                                const std::optional<Shape>& count, rr::Value items) {
+  if (count) {
+    const auto given = value_or_throw(rr::shape_of(items, *target.member, target.types()));
+    if (given != *count)
+      refuse(rr::ErrorCode::invalid_argument, "the value has " + shape_text(given) + " items, and count is " +
+                                                  shape_text(*count) + "; it can be left out");
+  }
+  auto part = target.request(rr::CallKind::memory_write);
+  part.range.position = offset.value_or(Shape(shape.size(), 0));
+  part.arguments.push_back(std::move(items));
+  co_await target.client->ask(std::move(part));
 }
 
 }  // namespace rrgate

@@ -40,5 +40,9 @@ rr::awaitable<Shape> memory_shape(const Target& target);
 /// Throws   rr::Exception: buffer_limit_violation for more than max_memory_bytes; what the device said.
 rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, const std::optional<Shape>& offset,
                                     const std::optional<Shape>& count);
+/// The same for writing. Throws   rr::Exception: invalid_argument where `count` is not what `items` has; what the
+/// device said.
+rr::awaitable<void> write_items(const Target& target, const Shape& shape, const std::optional<Shape>& offset,
+                                const std::optional<Shape>& count, rr::Value items);
 
 }  // namespace rrgate

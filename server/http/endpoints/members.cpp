@@ -172,6 +172,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   }
 
   const auto position = read_shape(request, "offset", shape.size());
+  const auto count = read_shape(request, "count", shape.size());
   if (request.method() == http::verb::put) {
     rr::Value items;
     if (request.has_bytes_body()) {
@@ -184,14 +185,10 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     } else {
       items = co_await body_value(request, target);
     }
-    auto part = target.request(rr::CallKind::memory_write);
-    part.range.position = position.value_or(Shape(shape.size(), 0));
-    part.arguments.push_back(std::move(items));
-    co_await target.client->ask(std::move(part));
+    co_await write_items(target, shape, position, count, std::move(items));
     co_return request.written_response();
   }
 
-  const auto count = read_shape(request, "count", shape.size());
   const bool is_flat = shape.size() == 1 && !rr::is_multidim(member.type);
   const bool is_whole = !position && !count;
   if (request.wanted() == BodyForm::bytes && is_whole && is_flat && item_bytes_of(target) > 0)
@@ -215,6 +212,10 @@ rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectReq
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {
+  // RFC 9110, section 14.4: what would write the part over the whole.
+  if (request.method() == http::verb::put && !request.request().header(http::field::content_range).empty())
+    refuse(rr::ErrorCode::invalid_argument,
+           "Content-Range is not for values; a part of a memory is written with ?offset=");
   Response response;
   switch (target.member->kind) {
     case rr::MemberKind::property:
