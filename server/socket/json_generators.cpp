@@ -67,9 +67,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
   }
   auto out = rr::OrderedJson::object();
   if (error) {
-    const bool has_ended = error->code == rr::ErrorCode::stop_iteration;
-    if (has_ended || error->code == rr::ErrorCode::operation_aborted) drop_open(reserved);
-    if (!has_ended) throw rr::Exception(*error);
+    if (!target->client->has_generator(generator.id)) drop_open(reserved);
+    if (error->code != rr::ErrorCode::stop_iteration) throw rr::Exception(*error);
     rr::add_key(out, "done") = true;
     co_return out;
   }

@@ -177,6 +177,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void find_object(const std::string& path, Completion done);
   /// Asks the device; the object of the call is a SharedObject that find_object() has found here.
   void request(UpstreamClient& client, const rr::Called& called, Completion done);
+  bool has_generator(UpstreamClient& client, rr::GeneratorId id) const { return generators_.contains({&client, id}); }
   /// A generator of this client that is over without having been closed.
   void drop_generator(UpstreamClient& client, rr::GeneratorId id);
   /// Of the client, not of the session: other clients are kept out by the gateway.

@@ -70,6 +70,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   /// `called.object`  a SharedObject that was found; `called.generator`: for generators, from next_generator().
   rr::awaitable<rr::Value> ask(rr::Called called);
   rr::GeneratorId next_generator() { return ++last_generator_; }
+  /// One that is open, and may be asked for its next value.
+  bool has_generator(rr::GeneratorId id) { return upstream_->has_generator(*this, id); }
   /// Of a generator that nobody wants to hear of any more.
   void drop_generator(rr::GeneratorId id) { upstream_->drop_generator(*this, id); }
   /// `timeout`  the dead-man's time, where a lease is asked for.

@@ -242,6 +242,14 @@ def test_generators(page):
     wait_until(lambda: page.ask("get", "generator_end") == "aborted")
 
 
+def test_a_generator_that_has_failed_is_over(page):
+    for _ in range(300):  # more than may be open at once
+        failing = page.open("open", "count_up", args={"first": 0, "count": -1})
+        page.ask("next", generator=failing)
+        assert page.refusal("next", generator=failing)[0] == "OutOfRange"
+    assert page.refusal("next", generator=failing)[0] == "InvalidArgument"
+
+
 def test_a_client_who_leaves_ends_its_generators(gateway):
     with Socket(gateway) as page:
         page.open("open", "count_up", args={"first": 0, "count": 1_000_000})
