@@ -74,11 +74,10 @@ struct McpBridge::Message {      // NOLINT(bugprone-exception-escape): JSON's nu
 /// carried as the newest revision has it, a request that is answered for as long as its connection lasts, and made anew
 /// after each cut.
 struct McpBridge::Subscription {
-  Subscription(const boost::asio::any_io_executor& executor, rr::OrderedJson asked, std::string of)
-      : id(std::move(asked)), uri(std::move(of)), again(executor) {}
+  Subscription(const boost::asio::any_io_executor& executor, std::string of) : uri(std::move(of)), again(executor) {}
 
-  rr::OrderedJson id;  ///< of the client's request; null once that is answered
-  std::string uri;     ///< empty: of the list
+  std::vector<rr::OrderedJson> unanswered = {};  ///< ids of the client's requests
+  std::string uri;                               ///< empty: of the list
   Message listening = {};
   boost::asio::steady_timer again;
   std::chrono::seconds pause = first_pause;
@@ -95,7 +94,7 @@ struct McpBridge::Subscription {
     return {{"jsonrpc", "2.0"}, {"method", resource_updated}, {"params", {{"uri", uri}}}};
   }
   void end() {
-    is_over = true;
+    is_over = listening.is_cancelled = true;
     again.cancel();
     if (listening.stream) listening.stream->close();
   }
@@ -166,10 +165,17 @@ void McpBridge::cancel(const std::string& id) {
 }
 
 void McpBridge::subscribe(const rr::OrderedJson& id, const std::string& uri) {
-  if (const auto found = subscriptions_.find(uri); found != subscriptions_.end()) return answer_empty(id);
+  if (const auto found = subscriptions_.find(uri); found != subscriptions_.end()) {
+    auto& subscription = *found->second;
+    if (subscription.has_begun) return answer_empty(id);
+    if (subscription.unanswered.size() >= most_at_once)
+      return refuse(id, internal_error, "more than " + std::to_string(most_at_once) + " messages at once");
+    return subscription.unanswered.push_back(id);
+  }
   if (subscriptions_.size() >= most_at_once)
     return refuse(id, internal_error, "more than " + std::to_string(most_at_once) + " subscriptions");
-  const auto made = std::make_shared<Subscription>(executor_, id, uri);
+  const auto made = std::make_shared<Subscription>(executor_, uri);
+  made->unanswered.push_back(id);
   subscriptions_[uri] = made;
   listen(made);
 }
@@ -189,7 +195,8 @@ void McpBridge::listen(const std::shared_ptr<Subscription>& made) {
 }
 
 void McpBridge::unsubscribe(const rr::OrderedJson& id, const std::string& uri) {
-  if (const auto found = subscriptions_.extract(uri)) found.mapped()->end();
+  if (const auto found = subscriptions_.find(uri); found != subscriptions_.end())
+    give_up(*found->second, internal_error, "the resource was unsubscribed from before the gateway had answered");
   answer_empty(id);
 }
 
@@ -198,8 +205,8 @@ rr::awaitable<void> McpBridge::keep_listening(std::shared_ptr<Subscription> subs
     const auto done = co_await exchange(subscription->listening);
     subscription->listening.stream = nullptr;
     if (subscription->is_over) break;
-    if (!subscription->id.is_null()) {
-      give_up(subscription->id, subscription->uri, done ? "the gateway has ended its answer" : done.error().message);
+    if (!subscription->unanswered.empty()) {
+      give_up(*subscription, resource_not_found, done ? "the gateway has ended its answer" : done.error().message);
       break;
     }
     subscription->again.expires_after(subscription->pause);
@@ -214,15 +221,17 @@ void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
   if (method == "notifications/subscriptions/acknowledged") {
     const bool is_told = news["params"]["notifications"].contains(subscription.kind());
     const bool is_first = !std::exchange(subscription.has_begun, true);
-    const auto id = std::exchange(subscription.id, nullptr);
+    const bool is_awaited = !subscription.unanswered.empty();
     if (is_told) subscription.pause = first_pause;
-    if (!id.is_null() && is_told) return answer_empty(id);
-    if (!id.is_null()) return give_up(id, uri, "there is no " + rr::quote(uri) + " whose changes can be told");
+    if (is_awaited && !is_told)
+      return give_up(subscription, resource_not_found, "there is no " + rr::quote(uri) + " whose changes can be told");
+    for (const auto& id : std::exchange(subscription.unanswered, {})) answer_empty(id);
+    if (is_awaited) return;
     if (!is_told) return subscription.listening.stream->close();  // not there yet
     if (uri.empty() && is_first) return;
   } else if (method != resource_updated && method != list_changed) {
     const auto why = text_in(news, {"error", "message"});
-    if (!why.empty() && !subscription.id.is_null()) give_up(std::exchange(subscription.id, nullptr), uri, why);
+    if (!why.empty() && !subscription.unanswered.empty()) give_up(subscription, resource_not_found, why);
     if (!why.empty() && uri.empty() && !subscription.has_begun) subscription.end();  // an older gateway
     return;
   }
@@ -230,9 +239,10 @@ void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
   tell_(rr::write_json(subscription.news()));
 }
 
-void McpBridge::give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why) {
-  refuse(id, resource_not_found, why);
-  if (const auto found = subscriptions_.extract(uri)) found.mapped()->end();
+void McpBridge::give_up(Subscription& subscription, int code, std::string_view why) {
+  for (const auto& id : std::exchange(subscription.unanswered, {})) refuse(id, code, why);
+  subscription.end();
+  subscriptions_.erase(subscription.uri);
 }
 
 void McpBridge::answer_empty(const rr::OrderedJson& id) {
@@ -316,7 +326,7 @@ void McpBridge::answer(Message& message, std::string text) {
   if (message.method == "initialize") revision_ = text_in(*json, {"result", "protocolVersion"});
   tell_(trimmed(std::move(text)));
   if (message.method == "initialize" && !revision_.empty() && !list_ && !is_ending_) {
-    list_ = std::make_shared<Subscription>(executor_, nullptr, "");
+    list_ = std::make_shared<Subscription>(executor_, "");
     listen(list_);
   }
 }

@@ -44,7 +44,8 @@ class McpBridge {
   void listen(const std::shared_ptr<Subscription>& subscription);
   void unsubscribe(const rr::OrderedJson& id, const std::string& uri);
   rr::awaitable<void> keep_listening(std::shared_ptr<Subscription> subscription);
-  void give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why);
+  /// Refuses what is not answered yet, and ends it.
+  void give_up(Subscription& subscription, int code, std::string_view why);
   void take_news(Subscription& subscription, const rr::Json& news);
   rr::awaitable<void> carry(std::shared_ptr<Message> message);
   rr::awaitable<rr::Result<>> exchange(Message& message);

@@ -2,6 +2,7 @@
 import contextlib
 import http.server
 import json
+import socket
 import threading
 import time
 
@@ -249,6 +250,29 @@ def listened_to(answers):
         yield server.server_port, asked
         server.shutdown()
         serving.join()
+
+
+def test_a_subscription_that_is_given_up_before_it_has_begun_is_answered(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        with speaking(tmp_path, f"http://127.0.0.1:{silent.getsockname()[1]}") as process:
+            say(process, "resources/subscribe", 2, uri="rrgate://a")
+            say(process, "resources/subscribe", 3, uri="rrgate://a")
+            say(process, "resources/unsubscribe", 4, uri="rrgate://a")
+            told = {each["id"]: each for each in (hear(process) for _ in range(3))}
+    assert told[4]["result"] == {}
+    assert "unsubscribed" in told[2]["error"]["message"] and told[3]["error"] == told[2]["error"]
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_each_who_subscribes_is_answered_as_the_gateway_answers(tmp_path, exists):
+    with listened_to([exists]) as (port, _), speaking(tmp_path, f"http://127.0.0.1:{port}") as process:
+        for number in (5, 6):
+            say(process, "resources/subscribe", number, uri="rrgate://a")
+        told = {each["id"]: each for each in (hear(process) for _ in range(2))}
+    if exists:
+        assert told[5]["result"] == told[6]["result"] == {}
+    else:
+        assert told[5]["error"]["code"] == told[6]["error"]["code"] == -32002
 
 
 def test_what_is_not_told_any_more_is_asked_for_ever_more_seldom_until_it_is_told(tmp_path):
