@@ -79,6 +79,10 @@ bool is_dry_run(const JsonRequest& arguments) {
   return given && given->get<bool>();
 }
 
+[[noreturn]] void refuse_late() {
+  refuse(rr::ErrorCode::operation_timeout, "the device has not answered in time");
+}
+
 /// The function or property that a command is for.
 const rr::MemberDefinition& commanded_member(const Target& target, Verb verb) {
   const bool is_call = verb == Verb::call;
@@ -279,11 +283,12 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
       if (entry) entry->finish(result ? rr::Result<>() : rr::Result<>(result.error()));
     };
     const auto answered = co_await ask(*client, std::move(called), longest_call, check, std::move(record));
-    if (!answered) {
+    if (!answered) refuse_late();
+    if (!*answered) {
       has_asked_device_ = true;
-      throw rr::Exception(answered.error());
+      throw rr::Exception(answered->error());
     }
-    said = std::move(*answered);
+    said = std::move(**answered);
   }
   if (lease) {
     lease->renew();
@@ -306,9 +311,10 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
   co_return out;
 }
 
-rr::awaitable<rr::Result<rr::Value>> McpTools::ask(ValueClient& client, rr::Called called,
-                                                   std::chrono::milliseconds longest,
-                                                   const std::function<void()>& check, OnAnswer on_answer) {
+rr::awaitable<std::optional<rr::Result<rr::Value>>> McpTools::ask(ValueClient& client, rr::Called called,
+                                                                  std::chrono::milliseconds longest,
+                                                                  const std::function<void()>& check,
+                                                                  OnAnswer on_answer) {
   struct Answered {
     std::optional<rr::Result<rr::Value>> result;
   };
@@ -324,9 +330,8 @@ rr::awaitable<rr::Result<rr::Value>> McpTools::ask(ValueClient& client, rr::Call
     check();
     return answered->result.has_value();
   };
-  if (!co_await reply_.wait(longest, is_answered))
-    refuse(rr::ErrorCode::operation_timeout, "the device has not answered in time");
-  co_return std::move(*answered->result);
+  (void)co_await reply_.wait(longest, is_answered);
+  co_return std::move(answered->result);
 }
 
 McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr<ValueClient> client,
@@ -339,8 +344,9 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
   opening.generator = generator->id();
   std::optional<rr::Error> failed;
   OnAnswer keep = [generator](const rr::Result<rr::Value>&) {};  // who goes before it is open leaves its end to this
-  if (const auto opened = co_await ask(*client, std::move(opening), longest_call, check, std::move(keep)); !opened)
-    failed = opened.error();
+  const auto opened = co_await ask(*client, std::move(opening), longest_call, check, std::move(keep));
+  if (!opened) refuse_late();
+  if (!*opened) failed = opened->error();
   auto results = rr::OrderedJson::array();
   std::size_t bytes = 0;
   bool has_ended = false;
@@ -349,7 +355,14 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
     auto step = target.request(rr::CallKind::generator_next);
     step.generator = generator->id();
     const auto rest = std::chrono::duration_cast<milliseconds>(until - std::chrono::steady_clock::now());
-    const auto next = co_await ask(*client, std::move(step), rest, check, nullptr);
+    const auto stepped = co_await ask(*client, std::move(step), rest, check, nullptr);
+    // What the device may take is also bounded by the configuration.
+    if (!stepped || (!*stepped && stepped->error().code == rr::ErrorCode::request_timeout)) {
+      if (results.empty()) refuse_late();
+      left_out = "the time for an answer was over";
+      break;
+    }
+    const auto& next = *stepped;
     has_ended = !next && next.error().code == rr::ErrorCode::stop_iteration;
     if (has_ended) break;
     if (!next) {

@@ -117,9 +117,10 @@ class McpTools {
   Answer give(const Command& command, const AgentTerms& terms);
   using OnAnswer = std::function<void(const rr::Result<rr::Value>&)>;
   /// Asks the device for a part of a command. `check`  throws where it must not go on; borrowed for the wait.
-  /// `on_answer`  called when the device answers, though nobody may wait for it any more.
-  rr::awaitable<rr::Result<rr::Value>> ask(ValueClient& client, rr::Called called, std::chrono::milliseconds longest,
-                                           const std::function<void()>& check, OnAnswer on_answer);
+  /// `on_answer`  called when the device answers, though nobody may wait for it any more. Nothing: not in time.
+  rr::awaitable<std::optional<rr::Result<rr::Value>>> ask(ValueClient& client, rr::Called called,
+                                                          std::chrono::milliseconds longest,
+                                                          const std::function<void()>& check, OnAnswer on_answer);
   /// All that a generator gives, up to as many as are wanted.
   Answer run_generator(const Command& command, std::shared_ptr<ValueClient> client, const std::function<void()>& check,
                        AuditEntryPtr entry);

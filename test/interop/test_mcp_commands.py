@@ -1,13 +1,15 @@
 """What agents command by the Model Context Protocol: nothing without a rule, limits, a person and a lease. The agent is the
 official Python SDK; what the devices were told is asked of them by clients that come by no gateway."""
 import contextlib
+import functools
 import http.client
 import json
+import threading
 import time
 
 import pytest
 
-from agents import call, hostile_robot, lose_role, meanwhile, records, with_tokens
+from agents import call, hostile_robot, lose_role, meanwhile, records, serving, with_tokens
 from http_api import ask
 from json_sockets import Socket
 from leases import LEASES, PLAIN, wait_for
@@ -322,6 +324,44 @@ def test_agents_write_to_nothing_but_properties_and_call_no_generators(lab):
         assert "agents call functions and set properties" in made.refusal(made.try_to(tool, path, **more)), path
     assert "can only be read" in made.refusal(made.try_to("set", "seen_target", value=1))
     assert made.arm.speed == 0
+
+
+SLOW = """service experimental.slow
+stdver 0.10
+object Robot
+    function int32{generator} steps(int32 prompt)
+end
+"""
+
+
+class Slow:
+    """A robot whose generator gives some results at once, and the next one when it is closed."""
+
+    def __init__(self):
+        self.is_over = threading.Event()
+
+    def steps(self, prompt):
+        yield from range(prompt)
+        self.is_over.wait(30)
+        yield -1
+
+
+def test_the_results_so_far_of_a_generator_that_takes_too_long_are_told(tmp_path):
+    config, agent, _ = with_tokens(tmp_path, {"roles": ["agent"], "may": ["call"], "agent": {"approval": "none", "lease": False}})
+    robot = Slow()
+    with serving(SLOW, "experimental.slow.Robot", robot) as url:
+        gateway, port = start_gateway(tmp_path, url, timeouts={"request_ms": 500}, **config)
+        try:
+            steps = functools.partial(call, port, "call", agent, device="interop", path="robot/steps", why="to count")
+            part = steps(args={"prompt": 2})
+            none = steps(args={"prompt": 0})
+        finally:
+            robot.is_over.set()
+            gateway.stop()
+    assert not part.is_error, part.structured_content
+    assert (part.structured_content["from_device"], part.structured_content["has_ended"]) == ([0, 1], False)
+    assert "time" in part.structured_content["result_left_out"]
+    assert none.is_error and "not answered in time" in none.structured_content["error"]["message"]
 
 
 def orders_in(json_value):
