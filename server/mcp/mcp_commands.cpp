@@ -145,7 +145,6 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
   const bool is_dry = is_dry_run(*arguments);
   Command command;
   command.target = co_await find(arguments);
-  has_asked_device_ = false;  // from here on these are the gateway's words, until the device is asked
   const auto& target = *command.target;
   allow(target, verb);
   const auto& member = commanded_member(target, verb);
@@ -397,7 +396,6 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
 
 McpTools::Answer McpTools::stop(JsonRequestPtr arguments) {
   const auto target = co_await find(arguments, true);
-  has_asked_device_ = false;
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
   const auto entry = gateway_.access().begin(who(), access_request(*target, Verb::call), trace, "stop");
   const auto stopped = target->client->upstream()->stop_object(target->path());

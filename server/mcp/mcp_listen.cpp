@@ -148,6 +148,7 @@ rr::awaitable<McpTools::FollowedPtr> McpTools::follow(std::string uri) {
       self->has_changed = true;
       if (error && error->code != rr::ErrorCode::connection_error) self->has_ended = true;
     };
+    has_asked_device_ = true;
     out->listener = value_or_throw(co_await out->target->client->listen(std::move(place), 0, std::move(handler)));
   }
   if (entry) entry->finish({});

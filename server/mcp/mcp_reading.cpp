@@ -123,6 +123,8 @@ McpTools::Answer McpTools::read(JsonRequestPtr arguments) {
 McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr target) {
   const auto& member =
       expect_member(*target, "read", {rr::MemberKind::property, rr::MemberKind::wire, rr::MemberKind::memory});
+  if (member.kind != rr::MemberKind::memory) expect_direction(member, rr::MemberDirection::writeonly);
+  has_asked_device_ = true;
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "member") = name_of(*target);
   if (target->is_shape) {  // all that who may write it alone may read of a memory
@@ -136,7 +138,6 @@ McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr targe
     rr::add_key(out, from_device) = std::move(items);
     co_return out;
   }
-  expect_direction(member, rr::MemberDirection::writeonly);
   auto how = rr::CallKind::property_get;
   if (member.kind == rr::MemberKind::wire) {
     how = rr::CallKind::peek_in;
@@ -192,6 +193,7 @@ McpTools::Answer McpTools::wait_for_event(JsonRequestPtr arguments) {
   const bool is_image = is_pipe && is_image_type(member.type, target->types());
   if (is_image && count) refuse(rr::ErrorCode::invalid_argument, "images come one at a time, without \"count\"");
   const auto entry = admit(*target, Verb::subscribe);
+  has_asked_device_ = true;
   auto place = target->place();
   auto handler = note_samples(heard, reply_.waker());
   const auto listener = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(handler)));
@@ -228,6 +230,7 @@ McpTools::Answer McpTools::watch(JsonRequestPtr arguments) {
   const auto& member = expect_member(*target, "watch", {rr::MemberKind::wire});
   expect_direction(member, rr::MemberDirection::writeonly);
   const auto entry = admit(*target, Verb::subscribe);
+  has_asked_device_ = true;
   const auto watched = std::make_shared<Watched>();
   auto place = target->place();
   auto handler = watch_samples(watched, target, reply_.waker());

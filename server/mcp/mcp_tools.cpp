@@ -236,19 +236,16 @@ rr::awaitable<TargetPtr> McpTools::find(JsonRequestPtr arguments, bool is_urgent
   has_asked_device_ = true;
   auto client = value_or_throw(co_await open_session(gateway_, std::move(device), std::move(key), std::move(from)));
   segments.erase(segments.begin());
-  LookJudge may_look = [this](const AccessRequest& object) {
-    auto allowed = gateway_.access().check(who(), object);
-    if (!allowed) has_asked_device_ = false;  // these are the gateway's words
-    return allowed;
-  };
-  co_return value_or_throw(co_await find_target(std::move(client), std::move(segments), std::move(may_look)));
+  LookJudge may_look = [this](const AccessRequest& object) { return gateway_.access().check(who(), object); };
+  auto found = co_await find_target(std::move(client), std::move(segments), std::move(may_look));
+  has_asked_device_ = false;  // from here on these are the gateway's words, until the device is asked
+  co_return value_or_throw(std::move(found));
 }
 
 AuditEntryPtr McpTools::admit(const Target& target, Verb verb) {
   auto begun = gateway_.access().check_and_begin(who(), access_request(target, verb),
                                                  trace_id_of(reply_.request().header("traceparent")));
   if (begun) return std::move(*begun);
-  has_asked_device_ = false;
   gateway_.reject(begun.error());
   throw rr::Exception(begun.error());
 }
@@ -256,7 +253,6 @@ AuditEntryPtr McpTools::admit(const Target& target, Verb verb) {
 void McpTools::allow(const Target& target, Verb verb) {
   const auto allowed = gateway_.access().check(who(), access_request(target, verb));
   if (allowed) return;
-  has_asked_device_ = false;
   gateway_.reject(allowed.error());
   throw rr::Exception(allowed.error());
 }

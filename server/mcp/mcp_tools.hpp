@@ -71,7 +71,8 @@ class McpTools {
   const Identity& who() const { return reply_.request().identity; }
   /// Throws   rr::Exception: there is no right to anything of it, or it is not there.
   Device& find_device(const std::string& name, const std::string& service);
-  /// Where "device" and "path" lead to. Throws   rr::Exception.
+  /// Where "device" and "path" lead to. The words of errors behind it are the gateway's, until the device is asked.
+  /// Throws   rr::Exception.
   /// `is_urgent`  past the rates of the device.
   rr::awaitable<TargetPtr> find(JsonRequestPtr arguments, bool is_urgent = false);
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.

@@ -77,7 +77,9 @@ def test_members_come_with_their_schemas_and_what_the_asker_may_do(site):
 def test_what_is_not_there_is_told(site):
     wrong = call(site.port, "read", device="interop", path="plain/nothing")
     assert wrong.is_error
-    assert "no member" in wrong.structured_content["error"]["from_device"]
+    assert "no member" in wrong.structured_content["error"]["message"]
+    resource = post(site.port, {"jsonrpc": "2.0", "id": 1, "method": "resources/read", "params": {"uri": "rrgate://interop/plain/nothing"}}).json
+    assert "no member" in resource["error"]["message"] and "data" not in resource["error"]
     assert call(site.port, "read", device="nobody", path="plain/speed").structured_content["error"]["message"].startswith("no device")
 
 

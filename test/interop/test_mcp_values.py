@@ -181,7 +181,6 @@ def test_a_wire_is_watched_and_summarised(lab):
     assert said["numbers"]["py"] == {"min": -4, "max": -4, "mean": -4}
     assert (said["numbers"]["px"]["min"], said["numbers"]["px"]["max"]) == (1, 3) and 1 < said["numbers"]["px"]["mean"] < 3
     assert lab.call("watch", "target").is_error
-    assert "is not for that" in lab.call("watch", "p_double").structured_content["error"]["from_device"]
     described = lab.call("describe", "pose").structured_content["members"][0]
     assert described["may"] == ["read", "subscribe"]
 
@@ -195,6 +194,17 @@ def test_the_next_packets_of_a_pipe(lab):
     assert few["happened"] is False and few["from_device"] == []
     for count in (0, 101, 1.5, "2"):
         assert lab.call("wait_for_event", "poses", count=count).is_error
+
+
+def test_what_the_gateway_refuses_is_said_in_its_own_words(lab):
+    for tool, path, words in (("read", "changed", "is not for that"), ("watch", "p_double", "is not for that"),
+                              ("wait_for_event", "p_double", "is not for that"), ("watch", "target", "can only be written"),
+                              ("read", "no_such", "no member"), ("read", "head/no_such", "no member"),
+                              ("read", "parts", "needs an index"), ("describe", "p_double/x", "nothing is below it")):
+        error = lab.call(tool, path).structured_content["error"]
+        assert words in error["message"] and "from_device" not in error, (tool, path)
+    gone = lab.call("read", "parts/99/size").structured_content["error"]
+    assert "no part" in gone["from_device"] and "message" not in gone
 
 
 def test_a_generator_runs_to_its_end_or_to_as_many_results_as_are_wanted(lab):

@@ -311,11 +311,7 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<V
     const AccessRequest object{
         .device = upstream->device().config().name, .service = upstream->service(), .path = path};
     if (const auto allowed = may_look(object); !allowed) co_return allowed.error();
-    try {
-      if (!upstream->object_type(path)) co_await client->find_object(path);
-    } catch (const rr::Exception& exception) {
-      co_return exception.error();
-    }
+    if (!upstream->object_type(path)) co_await client->find_object(path);
     if (!go_to(path)) co_return rr::make_error(rr::ErrorCode::object_not_found, "the object has gone");
   }
   co_return target;

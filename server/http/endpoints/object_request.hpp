@@ -121,7 +121,7 @@ using LookJudge = std::function<rr::Result<>(const AccessRequest& object)>;
 
 /// Walks, in a session that is open, from the root object along `segments`, percent-decoded: objrefs by name, an index
 /// behind those that have one, at last a member or nothing. Errors   object_not_found, member_not_found, those of the
-/// judge and of the device.
+/// judge. Throws   rr::Exception: what the device says.
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<ValueClient> client,
                                                                std::vector<std::string> segments, LookJudge may_look);
 

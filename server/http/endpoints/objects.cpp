@@ -268,15 +268,15 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       if (!allowed) unseen = allowed.error();
       return allowed;
     };
-    auto found = co_await find_target(std::move(used), std::move(segments), std::move(may_look));
+    try {
+      target = value_or_throw(co_await find_target(std::move(used), std::move(segments), std::move(may_look)));
+    } catch (const rr::Exception& exception) {
+      error = exception.error();
+    }
     if (unseen) {
       co_await refuse(gateway, writer, *unseen);
       co_return;
     }
-    if (found)
-      target = *found;
-    else
-      error = found.error();
   } else {
     error = client.error();
   }
