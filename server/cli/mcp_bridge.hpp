@@ -1,5 +1,5 @@
 // Messages of the Model Context Protocol between lines and /mcp of a gateway. Layer: server/cli. See docs/mcp.md.
-// Source: modelcontextprotocol.io, revisions 2025-03-26 to 2026-07-28, "stdio" and "Streamable HTTP".
+// Source: modelcontextprotocol.io, revisions 2025-06-18 to 2026-07-28, "stdio" and "Streamable HTTP".
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>

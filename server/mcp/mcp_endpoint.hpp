@@ -1,5 +1,5 @@
 // The Model Context Protocol: devices for agents, by JSON-RPC in requests of HTTP. Layer: server/mcp. See docs/mcp.md.
-// Source: modelcontextprotocol.io, revisions 2025-03-26 to 2026-07-28, "Streamable HTTP".
+// Source: modelcontextprotocol.io, revisions 2025-06-18 to 2026-07-28, "Streamable HTTP".
 #pragma once
 
 #include <string_view>

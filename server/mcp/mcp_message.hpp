@@ -1,5 +1,5 @@
 // One message of the Model Context Protocol, as an agent sends it: read, and refused. Layer: server/mcp.
-// Source: revisions 2025-03-26 to 2026-07-28 of the protocol, sections "Base protocol" and "Transports"; JSON-RPC 2.0.
+// Source: revisions 2025-06-18 to 2026-07-28 of the protocol, sections "Base protocol" and "Transports"; JSON-RPC 2.0.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 namespace rrgate {
 
 /// Revisions that begin with "initialize", oldest first.
-inline constexpr std::array<std::string_view, 3> handshake_revisions{"2025-03-26", "2025-06-18", "2025-11-25"};
+inline constexpr std::array<std::string_view, 2> handshake_revisions{"2025-06-18", "2025-11-25"};
 /// The one of which each request stands by itself.
 inline constexpr std::string_view newest_revision = "2026-07-28";
 

@@ -158,8 +158,9 @@ def test_messages_that_are_none_are_refused_with_what_was_expected(site):
     assert (old.status, old.json["error"]["code"]) == (400, -32022)
     cursor = post(site.port, {"jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {"cursor": "x"}}).json
     assert cursor["error"]["code"] == -32602
-    agreed = post(site.port, {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"protocolVersion": "2020-01-01"}}).json
-    assert agreed["result"]["protocolVersion"] == "2025-11-25"
+    for revision in ("2020-01-01", "2025-03-26"):  # that one wants batches
+        agreed = post(site.port, {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"protocolVersion": revision}}).json
+        assert agreed["result"]["protocolVersion"] == "2025-11-25"
     assert ask(site.port, "POST", "/mcp", b"{}", {"Content-Type": "text/plain"}).status == 415
     assert post(site.port, {}, {"Origin": "https://elsewhere.example"}).status == 403
 
