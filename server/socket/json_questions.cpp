@@ -15,6 +15,22 @@ constexpr std::size_t max_waiting = 64;
 /// What the client may take to answer the device.
 constexpr std::chrono::seconds answer_time{10};
 
+/// What a client answers instead of a result. A name is one of Robot Raconteur's, or of an exception of a definition.
+rr::Error read_error(const rr::Json& given) {
+  const auto text = [&given](const char* key) {
+    const auto found = given.is_object() ? given.find(key) : given.end();
+    return found != given.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const auto name = text("name");
+  if (name.empty()) return rr::make_error(rr::ErrorCode::operation_failed, text("message"));
+  for (auto code = 1u; code <= unsigned(rr::ErrorCode::permission_denied); ++code)
+    if (auto error = rr::make_error(rr::ErrorCode(code), {}); error.qualified_name() == name) {
+      error.message = text("message");
+      return error;
+    }
+  return rr::declared_error(name, text("message"));
+}
+
 }  // namespace
 
 rr::Error client_gone() {
@@ -64,15 +80,7 @@ void JsonQuestions::answer(const JsonRequest& request) {
   const auto asked = found->second;
   waiting_.erase(found);
   const auto& member = *asked->target->member;
-  if (const auto* error = request.find("error")) {
-    const auto text = [&](const char* name) {
-      const auto item = error->is_object() ? error->find(name) : error->end();
-      return error->is_object() && item != error->end() && item->is_string() ? item->get<std::string>() : "";
-    };
-    const auto name = text("name");
-    return asked->reply(name.empty() ? rr::make_error(rr::ErrorCode::operation_failed, text("message"))
-                                     : rr::declared_error(name, text("message")));
-  }
+  if (const auto* error = request.find("error"); error && !error->is_null()) return asked->reply(read_error(*error));
   static const rr::Json none;
   const auto* result = request.find("result");
   const auto value =

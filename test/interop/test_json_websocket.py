@@ -271,6 +271,12 @@ def test_callbacks(page):
     page.ask("call", "start_ask", args={"question": "and now?"})
     page.ask("answer", call=page.next(callback=asked)["call"], error={"message": "no idea"})
     wait_until(lambda: page.ask("get", "answer_error") == "RobotRaconteur.OperationFailed")
+    page.ask("call", "start_ask", args={"question": "may I?"})
+    page.ask("answer", call=page.next(callback=asked)["call"], error={"name": "RobotRaconteur.OutOfRange", "message": "no"})
+    wait_until(lambda: page.ask("get", "answer_error") == "RobotRaconteur.OutOfRange")
+    page.ask("call", "start_ask", args={"question": "and here?"})
+    page.ask("answer", call=page.next(callback=asked)["call"], result=7.5, error=None)
+    wait_until(lambda: page.ask("get", "answered") == 7.5)
     page.ask("call", "start_ask", args={"question": "a number?"})
     assert "expected a number" in page.refusal("answer", call=page.next(callback=asked)["call"], result="12")[1]
     wait_until(lambda: page.ask("get", "answer_error") != "")
@@ -300,6 +306,8 @@ def test_memories(page):
     assert page.refusal("read", "m_numbers", offset=[1, 2])[0] == "InvalidArgument"
     assert page.refusal("write", "m_fixed", value="AA==")[0] == "ReadOnlyMember"
     assert page.refusal("read", "m_numbers", count=[2**40])[0] == "BufferLimitViolation"
+    assert page.refusal("write", "m_numbers", offset=[3], count=[1], value=[9, 9])[0] == "InvalidArgument"
+    assert page.ask("read", "m_numbers", offset=[3], count=[2]) == [3, 4]
 
 
 def test_users_and_locks(gateway):
@@ -314,8 +322,6 @@ def test_users_and_locks(gateway):
             assert other.ask("call", "who") == "bob"
             page.ask("lock", kind="client")
             assert other.refusal("set", "level", value=3)[0] == "ObjectLockedError"
-    assert page.refusal("write", "m_numbers", offset=[3], count=[1], value=[9, 9])[0] == "InvalidArgument"
-    assert page.ask("read", "m_numbers", offset=[3], count=[2]) == [3, 4]
             page.ask("set", "level", value=2)
             page.ask("unlock")
             other.ask("set", "level", value=1.5)
