@@ -461,10 +461,8 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
   const auto index = found->second.index;
   if (called.kind == rr::CallKind::generator_next) {
     auto stepped = [weak = weak_from_this(), key, life, done = std::move(done)](rr::Result<rr::Value> value) {
-      // One that takes too long, or whose value can't be read, is still there, and is to be ended.
-      const bool has_ended =
-          !value && value.error().code != rr::ErrorCode::request_timeout && !rr::is_unread_reply(value.error());
-      if (const auto self = weak.lock(); self && has_ended && !life.expired()) self->generators_.erase(key);
+      if (const auto self = weak.lock(); self && !value && !life.expired())
+        self->handle_failed_step(*key.first, key.second, value.error());
       done(std::move(value));
     };
     std::optional<rr::Value> parameter;
@@ -476,6 +474,17 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
     connection_->close_generator(path, name, index, std::move(done));
   else
     connection_->abort_generator(path, name, index, std::move(done));
+}
+
+void Upstream::handle_failed_step(UpstreamClient& client, rr::GeneratorId id, const rr::Error& error) {
+  // One that takes too long, or whose value can't be read, is still there, and is the client's to end.
+  if (error.code == rr::ErrorCode::request_timeout || rr::is_unread_reply(error)) return;
+  // The device has ended it, or has perhaps not heard of this step, which was too large to be sent.
+  const bool has_ended = error.code == rr::ErrorCode::stop_iteration || error.code == rr::ErrorCode::operation_aborted;
+  if (has_ended)
+    generators_.erase({&client, id});
+  else
+    drop_generator(client, id);
 }
 
 void Upstream::drop_generator(UpstreamClient& client, rr::GeneratorId id) {

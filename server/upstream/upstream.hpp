@@ -328,6 +328,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
   void send_safe(const SafeRequest& request, Completion done);
   void answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
+  /// Of a generator, which has given no value.
+  void handle_failed_step(UpstreamClient& client, rr::GeneratorId id, const rr::Error& error);
   void attach_wire(const MemberKey& key);
   bool has_joined(const UpstreamClient& client, const MemberKey& key) const;
   void publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time);

@@ -24,6 +24,7 @@ object Bench
     property int32 number
     callback int32 ask()
     function int32{generator} count()
+    function void fill(uint8[]{generator} bytes)
     function void wait()
     function void take(uint8[] bytes)
     function void stop()
@@ -46,6 +47,11 @@ struct Counting {
   Counting() {
     service->generator(
         "count", [this] { return [next = 0, token = life]() mutable { return std::optional<std::int32_t>(++next); }; });
+    service->generator("fill", [this] {
+      rr::Generator made;
+      made.start = [token = life](rr::Value, const std::shared_ptr<rr::LateCall>& call) { call->answer(rr::Value()); };
+      return made;
+    });
     service->root().objref("spare", std::shared_ptr<rr::Object>());
     service->root().objref("others", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });

@@ -271,6 +271,22 @@ TEST_CASE("a generator whose value comes too late is the client's still, to be e
   }
 }
 
+TEST_CASE("a generator whose step is too large to be sent is ended at the device, which knows nothing of it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient client(bench.upstream);
+  const auto opened = bench.ask(client, rr::CallKind::generator_open, "bench", "fill", 1);
+  REQUIRE(bench.run_until([&] { return opened->has_value(); }));
+  REQUIRE(device.open_generators() == 1);
+  const auto next = bench.ask(client, rr::CallKind::generator_next, "bench", "fill", 1,
+                              {rr::Value(std::vector<std::uint8_t>(13'000'000))});
+  REQUIRE(bench.run_until([&] { return next->has_value(); }));
+  REQUIRE_FALSE((**next).has_value());
+  CHECK_FALSE(bench.upstream->has_generator(client, 1));
+  CHECK(bench.run_until([&] { return device.open_generators() == 0; }));
+}
+
 TEST_CASE("an object that is of another type after an outage is released, and found as what it is") {
   const std::string path = "bench.things[1]";
   Counting device;
