@@ -88,12 +88,13 @@ class EncodedMessage {
 
 struct EncodeOptions {
   StringTableMode string_table = {};  ///< applied to version 4 only
-  /// Bytes; a larger message gives protocol_error and nothing is written. A receiver's default limit less 100.
+  /// Bytes; a larger message gives buffer_limit_violation and nothing is written. A receiver's default limit less 100.
   std::size_t max_message_size = 12u * 1024 * 1024 - 100;
 };
 
 /// Encodes `message` in the version of its header. `out` is overwritten and its capacity reused.
-/// Errors   protocol_error: a limit of section 11, version-4 features in a version-2 message, an unknown version;
+/// Errors   buffer_limit_violation: the message is too large; protocol_error: another limit of section 11, version-4
+///          features in a version-2 message, an unknown version;
 ///          data_type_error: a type that never travels; data_serialization_error: count and data of an element
 ///          disagree.
 [[nodiscard]] Result<> encode(const Message& message, const EncodeOptions& options, EncodedMessage& out);

@@ -1,31 +1,3 @@
-def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gateway):
-    ask(gateway, "PUT", "/m_numbers", [1, 2, 3, 4])
-    ranged = ask(gateway, "PUT", "/m_numbers", [9, 9], {"Content-Range": "bytes 16-31/800"})
-    assert ranged.status == 400 and "offset" in ranged.json["detail"]
-    assert ask(gateway, "PUT", "/p_double", 9, {"Content-Range": "bytes 0-7/8"}).status == 400
-    longer = ask(gateway, "PUT", "/m_numbers?offset=1&count=1", [9, 9, 9])
-    assert (longer.status, longer.json["error"]["name"]) == (400, "RobotRaconteur.InvalidArgument")
-    assert "3 items" in longer.json["detail"]
-    assert ask(gateway, "PUT", "/m_grid?offset=0,0,0&count=4,1,1", {"dims": [2, 2, 1], "data": [0, 0, 0, 0]}).status == 400
-    assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 2, 3, 4]
-    assert ask(gateway, "PUT", "/m_numbers?offset=1&count=2", [20, 30], {"Range": "bytes=0-7"}).status == 204  # it is of GET alone
-    assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 20, 30, 4]
-
-
-def test_a_memory_of_pods_is_read_in_parts(tmp_path):
-    device = Background([sys.executable, PEERS / "many_samples.py"], tmp_path / "device.log")
-    process, port = start_gateway(tmp_path, json.loads(device.next_line())["url"])
-    try:
-        memory = "/api/v1/devices/interop/device/samples"
-        whole = http_api.ask(port, "GET", memory)
-        assert (whole.status, whole.json["error"]["name"]) == (413, "RobotRaconteur.BufferLimitViolation")
-        part = http_api.ask(port, "GET", memory + "?offset=79998&count=2")
-        assert (part.status, part.json) == (200, [{"id": 0, "reading": [0] * 16}] * 2)
-    finally:
-        process.stop()
-        device.stop()
-
-
 """The objects of a device over plain HTTP, as curl would use them; the device is the reference and ours in turn."""
 import base64
 import functools
@@ -196,6 +168,42 @@ def test_memories(gateway):
     assert ask(gateway, "GET", "/m_numbers?offset=1,2").status == 400
     assert ask(gateway, "GET", "/m_numbers?offset=99&count=2").status == 400
     assert ask(gateway, "PUT", "/m_fixed", "AA==").status == 405
+
+
+def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gateway):
+    ask(gateway, "PUT", "/m_numbers", [1, 2, 3, 4])
+    ranged = ask(gateway, "PUT", "/m_numbers", [9, 9], {"Content-Range": "bytes 16-31/800"})
+    assert ranged.status == 400 and "offset" in ranged.json["detail"]
+    assert ask(gateway, "PUT", "/p_double", 9, {"Content-Range": "bytes 0-7/8"}).status == 400
+    longer = ask(gateway, "PUT", "/m_numbers?offset=1&count=1", [9, 9, 9])
+    assert (longer.status, longer.json["error"]["name"]) == (400, "RobotRaconteur.InvalidArgument")
+    assert "3 items" in longer.json["detail"]
+    assert ask(gateway, "PUT", "/m_grid?offset=0,0,0&count=4,1,1", {"dims": [2, 2, 1], "data": [0, 0, 0, 0]}).status == 400
+    assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 2, 3, 4]
+    assert ask(gateway, "PUT", "/m_numbers?offset=1&count=2", [20, 30], {"Range": "bytes=0-7"}).status == 204  # it is of GET alone
+    assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 20, 30, 4]
+
+
+def test_what_is_too_large_for_a_message_is_not_sent_and_said_to_be_that(gateway):
+    ask(gateway, "PUT", "/p_string", "short")
+    large = ask(gateway, "PUT", "/p_string", "x" * 13_000_000)
+    assert (large.status, large.json["error"]["name"]) == (413, "RobotRaconteur.BufferLimitViolation")
+    assert "the limit is" in large.json["detail"]
+    assert ask(gateway, "GET", "/p_string").json == "short"
+
+
+def test_a_memory_of_pods_is_read_in_parts(tmp_path):
+    device = Background([sys.executable, PEERS / "many_samples.py"], tmp_path / "device.log")
+    process, port = start_gateway(tmp_path, json.loads(device.next_line())["url"])
+    try:
+        memory = "/api/v1/devices/interop/device/samples"
+        whole = http_api.ask(port, "GET", memory)
+        assert (whole.status, whole.json["error"]["name"]) == (413, "RobotRaconteur.BufferLimitViolation")
+        part = http_api.ask(port, "GET", memory + "?offset=79998&count=2")
+        assert (part.status, part.json) == (200, [{"id": 0, "reading": [0] * 16}] * 2)
+    finally:
+        process.stop()
+        device.stop()
 
 
 def test_wires_as_values(gateway):

@@ -361,7 +361,7 @@ describe("a slow network", () => {
   it("of a message above the limit ends with an error that says so; the session lives on", async () => {
     const robot = await start();
     const error = await failure(robot["text"]!.set("x".repeat(13 * 1024 * 1024)));
-    expect(error.code).toBe(ErrorCode.ProtocolError);
+    expect(error.code).toBe(ErrorCode.BufferLimitViolation);
     expect(await robot["twice"]!(1)).toBe(1);
     await robot.$.close();
   });
