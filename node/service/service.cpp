@@ -188,6 +188,13 @@ void Object::set_in_value(std::string_view wire, Value value, std::optional<Time
   }
 }
 
+void Object::reset_wire(std::string_view wire) {
+  Member& mine = members_[&require_member(wire, MemberKind::wire)];
+  mine.own_in_values.clear();
+  mine.in_time.reset();
+  mine.in_value.reset();
+}
+
 void Object::set_wire_for(ClientId client, std::string_view wire, Value value) {
   WirePacket packet = pack_in_value(wire, value);
   if (service_.find_client(client).id == 0) return;

@@ -163,6 +163,10 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   /// The same, with the time that clients get with it: of what is played back or passed on. A client that has had a
   /// later one gets a time just above that.
   void set_wire(std::string_view wire, Value value, TimeSpec time);
+  /// The wire has no InValue again, as before the first set_wire(): for peeks, and for clients that connect it from now
+  /// on. Those that have connected it keep what they received: nothing in the protocol takes it back. Throws
+  /// std::invalid_argument: no such wire.
+  void reset_wire(std::string_view wire);
   /// Sets the InValue of one client alone, in place of the one that all have: for its peeks and for when it connects
   /// the wire later, too. Until set_wire() sets that of all again. Nothing happens where the client is gone. Throws as
   /// set_wire().

@@ -178,7 +178,7 @@ bool Player::has_state(std::uint16_t channel) const {
   return kind == rr::MemberKind::wire || kind == rr::MemberKind::property;
 }
 
-/// Hands out the newest value before the next message of each wire and property.
+/// Hands out the newest value before the next message of each wire and property; those without one have none again.
 void Player::restore() {
   const auto chunk = chunk_;
   const auto end = message_;
@@ -193,6 +193,8 @@ void Player::restore() {
       if (has_state(message.channel) && found.insert(message.channel).second) deliver(message);
     }
   }
+  for (const auto& [channel, member] : recording_.members())
+    if (has_state(channel) && !found.contains(channel)) listener_.forget(channel);
 }
 
 }  // namespace rrgate

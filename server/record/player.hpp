@@ -31,6 +31,8 @@ class Player {
   struct Listener {
     /// `shift`  what is to be added to time stamps, in ns: they go on where the recording went back.
     std::function<void(const McapMessage&, McapTime shift)> play;
+    /// It went to where a wire or property has no value yet.
+    std::function<void(std::uint16_t channel)> forget;
     /// The player was started, stopped, moved or set; and ten times a second while it plays.
     std::function<void()> changed;
     /// The file can't be read any more: it is paused.

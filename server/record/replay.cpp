@@ -47,7 +47,8 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
     : io_(io),
       options_(std::move(options)),
       player_(io, std::move(recording),
-              {[this](const McapMessage& message, McapTime shift) { play(message, shift); }, [this] { tell_state(); },
+              {[this](const McapMessage& message, McapTime shift) { play(message, shift); },
+               [this](std::uint16_t channel) { service_of(channel).forget(channel); }, [this] { tell_state(); },
                [this](const rr::Error& error) { report(error.message); }}) {
   for (const auto& recorded : player_.recording().services()) {
     auto service = ReplayedService::make(player_.recording(), recorded);
@@ -114,12 +115,17 @@ void Replay::tell_state() {
   for (const auto& control : controls_) control->set_wire("state", value);
 }
 
+ReplayedService& Replay::service_of(std::uint16_t channel) {
+  return *std::find_if(services_.begin(), services_.end(),
+                       [channel](const ReplayedService& each) { return each.has(channel); });
+}
+
 void Replay::play(const McapMessage& message, McapTime shift) {
-  const auto service = std::find_if(services_.begin(), services_.end(),
-                                    [&message](const ReplayedService& each) { return each.has(message.channel); });
   const auto document = player_.recording().read_document(message);
-  const auto played = document ? service->play(message.channel, *document, to_time_spec(message.publish_time + shift))
-                               : rr::Result<>(document.error());
+  const auto played =
+      document
+          ? service_of(message.channel).play(message.channel, *document, to_time_spec(message.publish_time + shift))
+          : rr::Result<>(document.error());
   if (played) return;
   const auto& topic = player_.recording().members().at(message.channel).topic;
   auto what = document ? player_.recording().path() + ": " + topic + ", message " + std::to_string(message.sequence) +

@@ -47,6 +47,7 @@ class Replay {
   };
   Node& node_of(const RecordedService& recorded);
   void add_control(rr::Node& node);
+  ReplayedService& service_of(std::uint16_t channel);
   void play(const McapMessage& message, McapTime shift);
   void tell_state();
   void report(const std::string& problem) const;

@@ -116,4 +116,12 @@ rr::Result<> ReplayedService::play(std::uint16_t channel, const rr::Json& docume
   }
 }
 
+void ReplayedService::forget(std::uint16_t channel) {
+  const auto& member = members_.at(channel);
+  if (member.property)
+    member.property->reset();
+  else
+    member.object->reset_wire(member.definition->name);
+}
+
 }  // namespace rrgate

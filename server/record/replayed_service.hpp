@@ -23,6 +23,8 @@ class ReplayedService {
   /// `channel`  one that it has. `sent`  the time of wires.
   /// Errors   those of value_from_json().
   rr::Result<> play(std::uint16_t channel, const rr::Json& document, rr::TimeSpec sent);
+  /// `channel`  of a wire or property that it has: it has no value again.
+  void forget(std::uint16_t channel);
 
  private:
   struct Member {

@@ -226,6 +226,9 @@ def test_a_replay_is_steered_by_any_client(node, of_create, tmp_path):
         duration = json.loads(rrgate("get", control, "state", "--json"))["duration"]
         rrgate("call", control, "seek", duration)
         assert json.loads(rrgate("get", replay.url, "state", "--json"))["x"] == pytest.approx(states[-1]["x"], abs=0.05)
+        rrgate("call", control, "seek", "0")
+        assert "has no value yet" in rrgate("get", replay.url, "state", code=5)
+        assert "has no value yet" in rrgate("get", replay.url, "DistanceTraveled", code=5)
         rrgate("call", control, "seek", "0.5")
         rrgate("call", control, "step", "1")
         told = json.loads(rrgate("get", control, "state", "--json"))

@@ -205,6 +205,31 @@ TEST_CASE("wires: the present value at once, newer ones as they come, peeks with
   CHECK(seen.size() == 2);
 }
 
+TEST_CASE("a wire that is reset has no value until it is set again; clients that follow it keep theirs") {
+  CounterNode device;
+  const auto one = device.connect();
+  const auto two = device.connect();
+  one.call("add", 5);
+  std::vector<Value> seen_by_one, seen_by_two;
+  one.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_one.push_back(value); });
+  REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 1; }, 5s));
+  const auto id = *one.call("who").to<std::uint64_t>();
+  device.node.ask([&](Node&) {
+    auto& root = device.counter->service->root();
+    root.set_wire_for(id, "newest", 50);
+    root.reset_wire("newest");
+    CHECK_THAT(refusal([&] { root.reset_wire("nonesuch"); }), Contains("nonesuch"));
+    return 0;
+  });
+  CHECK(error_of([&] { one.peek_in("newest"); }).code == ErrorCode::value_not_set);
+  two.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_two.push_back(value); });
+  one.call("add", 1);
+  REQUIRE(two.connection().run_until([&] { return seen_by_two.size() == 1; }, 5s));
+  CHECK(seen_by_two.front() == Value(6));
+  REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 3; }, 5s));
+  CHECK(seen_by_one == std::vector<Value>{Value(5), Value(50), Value(6)});
+}
+
 TEST_CASE("a wire is sent to who follows it now: clients leave, come back and vanish") {
   CounterNode device;
   const auto staying = device.connect();

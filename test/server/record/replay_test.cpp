@@ -138,6 +138,24 @@ class RunningReplay {
   std::thread thread_;
 };
 
+/// A recording of a Dev that is written by hand.
+struct DevFile {
+  rr::TypeRegistry types;
+  RecordingWriter writer;
+  RecordedService service{"Dev", "rr+tcp://h/?service=Dev", "Dev", "com.dev.Dev"};
+
+  explicit DevFile(const test::Folder& folder) : writer(RecordingWriter::create(folder.path("by hand.mcap")).value()) {
+    REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+    service.definitions = {definition};
+    service.objects = {{"Dev", "com.dev.Dev"}};
+    REQUIRE(writer.add_service(service));
+  }
+  std::uint16_t add(const char* name) {
+    const auto* member = types.find_entity("com.dev.Dev")->find_member(name);
+    return writer.add_member(service, "Dev", "", *member, rr::named_type_schemas(types)).value();
+  }
+};
+
 using Stamped = std::pair<rr::TimeSpec, double>;
 
 /// Of a channel of the file.
@@ -279,15 +297,9 @@ TEST_CASE("a replay is moved, stepped, sped up and played again, and time stamps
 
 TEST_CASE("what a wire sends after the replay went back is newer than all before, whatever its time stamps are") {
   const test::Folder folder;
-  rr::TypeRegistry types;
-  REQUIRE(types.add({definition}, rr::RobdefMode::strict));
-  auto writer = RecordingWriter::create(folder.path("late.mcap")).value();
-  RecordedService service{"Dev", "rr+tcp://h/?service=Dev", "Dev", "com.dev.Dev"};
-  service.definitions = {definition};
-  service.objects = {{"Dev", "com.dev.Dev"}};
-  REQUIRE(writer.add_service(service));
-  const auto* count = types.find_entity("com.dev.Dev")->find_member("count");
-  const auto channel = writer.add_member(service, "Dev", "", *count, rr::named_type_schemas(types)).value();
+  DevFile file(folder);
+  auto& writer = file.writer;
+  const auto channel = file.add("count");
   // The values are a second apart, and reached the recorder at once.
   for (int i = 1; i <= 3; ++i) REQUIRE(writer.write(channel, {{"value", i}}, rr::TimeSpec{i, 0}, {5, i}));
   REQUIRE(writer.close());
@@ -296,6 +308,7 @@ TEST_CASE("what a wire sends after the replay went back is newer than all before
   std::vector<McapTime> stamps;
   Player::Listener listener;
   listener.play = [&](const McapMessage& message, McapTime shift) { stamps.push_back(message.publish_time + shift); };
+  listener.forget = [](std::uint16_t) {};
   listener.changed = [] {};
   listener.failed = [](const rr::Error& error) { FAIL_CHECK(error.message); };
   Player player(io, Recording::open(writer.path()).value(), listener);
@@ -309,6 +322,46 @@ TEST_CASE("what a wire sends after the replay went back is newer than all before
   CHECK(stamps.size() >= 11);
   CHECK(std::is_sorted(stamps.begin(), stamps.end(), std::less_equal<>()));
   CHECK(std::adjacent_find(stamps.begin(), stamps.end()) == stamps.end());
+}
+
+TEST_CASE("before its first value, a wire or property that a replay goes back to has none again") {
+  const test::Folder folder;
+  DevFile file(folder);
+  const auto count = file.add("count");
+  const auto gain = file.add("gain");
+  for (int i = 1; i <= 2; ++i) REQUIRE(file.writer.write(count, {{"value", i}}, rr::TimeSpec{i, 0}, {5 + i, 0}));
+  REQUIRE(file.writer.write(gain, {{"value", 7}}, {}, {8, 0}));
+  REQUIRE(file.writer.write(gain, {{"value", 8}}, {}, {9, 0}));
+  REQUIRE(file.writer.close());
+
+  const RunningReplay replay(file.writer.path());
+  auto dev = rr::connect(replay.url());
+  auto control = rr::connect(replay.control_url());
+  const auto count_now = [&] { return dev.peek_in("count").to<std::int32_t>().value(); };
+  const auto gain_now = [&] { return dev.get("gain").to<std::int32_t>().value(); };
+  const auto has_no_gain = [&] { return rr::error_of([&] { dev.get("gain"); }).code == rr::ErrorCode::value_not_set; };
+  const auto has_no_count = [&] {
+    return rr::error_of([&] { dev.peek_in("count"); }).code == rr::ErrorCode::value_not_set;
+  };
+  for (int round = 0; round < 2; ++round) {  // and each message comes once
+    CHECK(has_no_count());
+    control.call("step", 1u);
+    CHECK(count_now() == 1);
+    control.call("step", 1u);
+    CHECK(count_now() == 2);
+    CHECK(has_no_gain());
+    control.call("step", 1u);
+    CHECK(gain_now() == 7);
+    control.call("step", 1u);
+    CHECK(gain_now() == 8);
+    control.call("seek", 1.5);
+    CHECK(count_now() == 2);
+    CHECK(has_no_gain());
+    control.call("seek", 3.0);
+    CHECK(gain_now() == 7);
+    control.call("seek", 0.0);
+    CHECK(has_no_gain());
+  }
 }
 
 TEST_CASE("a property that is slow to answer holds up no other") {
