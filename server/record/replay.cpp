@@ -37,6 +37,14 @@ Address address_of(const std::string& text, std::size_t number) {
   return {scheme + "://" + rr::format_host_port(place->host, place->port), scheme + "://" + host};
 }
 
+std::string free_name(const std::string& wanted, const std::vector<RecordedService>& taken) {
+  auto out = wanted;
+  const auto is_it = [&out](const RecordedService& each) { return each.service == out; };
+  for (int number = 2; std::any_of(taken.begin(), taken.end(), is_it); ++number)
+    out = wanted + "_" + std::to_string(number);
+  return out;
+}
+
 rr::Exception out_of_range(std::string what) {
   return rr::Exception(rr::make_error(rr::ErrorCode::out_of_range, std::move(what)));
 }
@@ -49,24 +57,32 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
       player_(io, std::move(recording),
               {[this](const McapMessage& message, McapTime shift) { play(message, shift); },
                [this](std::uint16_t channel) { service_of(channel).forget(channel); }, [this] { tell_state(); },
-               [this](const rr::Error& error) { report(error.message); }}) {
+               [this](const rr::Error& error) { report(error.message); }}),
+      control_name_(free_name("replay", player_.recording().services())) {
   for (const auto& recorded : player_.recording().services()) {
     auto service = ReplayedService::make(player_.recording(), recorded);
     if (!service) throw std::invalid_argument(service.error().message);
     auto& node = node_of(recorded);
     node.node->add(service->service());
+    node.services.insert(recorded.service);
     urls_.push_back(node.address + "/?service=" + rr::percent_encode(recorded.service));
     services_.push_back(std::move(*service));
   }
   tell_state();
 }
 
+/// A node has one service of a name: a further one that was recorded, by another URL for instance, is at a further
+/// node.
 Replay::Node& Replay::node_of(const RecordedService& recorded) {
-  const auto is_its = [&recorded](const Node& node) { return node.recorded == recorded.node; };
-  if (const auto found = std::find_if(nodes_.begin(), nodes_.end(), is_its); found != nodes_.end()) return *found;
+  bool is_further = false;
+  for (auto& node : nodes_) {
+    if (node.recorded != recorded.node) continue;
+    if (!node.services.contains(recorded.service)) return node;
+    is_further = true;
+  }
   const auto address = address_of(options_.listen, nodes_.size());
   rr::NodeOptions how;
-  if (options_.keeps_ids) how.id = recorded.node.id;
+  if (options_.keeps_ids && !is_further) how.id = recorded.node.id;
   how.report = [this](const std::string& problem) { report(problem); };
   auto node = std::make_unique<rr::Node>(io_, recorded.node.name, how);
   add_control(*node);
@@ -76,7 +92,7 @@ Replay::Node& Replay::node_of(const RecordedService& recorded) {
 }
 
 void Replay::add_control(rr::Node& node) {
-  auto control = rr::Service::from_text({std::string(robdef_replay)}, control_name, "Replay");
+  auto control = rr::Service::from_text({std::string(robdef_replay)}, control_name_, "Replay");
   control->property("file").get([this] { return player_.recording().path(); });
   control->property("speed").get([this] { return player_.state().speed; }).set([this](double speed) {
     if (!(speed >= Player::min_speed && speed <= Player::max_speed))

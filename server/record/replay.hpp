@@ -25,9 +25,6 @@ struct ReplayOptions {
 /// For the thread of its io_context, which outlives it.
 class Replay {
  public:
-  /// Name of the service that controls it, beside those of each node.
-  static constexpr const char* control_name = "replay";
-
   /// Throws   std::invalid_argument: the recording does not hold what it takes, or not such a URL; std::runtime_error:
   ///          it can't listen there.
   Replay(boost::asio::io_context& io, Recording recording, ReplayOptions options);
@@ -37,13 +34,16 @@ class Replay {
   Player& player() { return player_; }
   /// Of each service: what clients connect to.
   const std::vector<std::string>& urls() const { return urls_; }
+  /// Of the service that controls it, at each node: "replay", or, where a recorded service has that, "replay_2", ...
+  const std::string& control_name() const { return control_name_; }
   void stop();
 
  private:
   struct Node {
     rr::NodeIdentity recorded;
     std::unique_ptr<rr::Node> node;
-    std::string address;  ///< "rr+tcp://127.0.0.1:52222"
+    std::string address;                  ///< "rr+tcp://127.0.0.1:52222"
+    std::set<std::string> services = {};  ///< by name; without the one that controls it
   };
   Node& node_of(const RecordedService& recorded);
   void add_control(rr::Node& node);
@@ -55,6 +55,7 @@ class Replay {
   boost::asio::io_context& io_;
   ReplayOptions options_;
   Player player_;
+  std::string control_name_;
   std::vector<ReplayedService> services_;
   std::vector<std::shared_ptr<rr::Service>> controls_;
   std::vector<Node> nodes_;

@@ -115,8 +115,7 @@ Recorded record(const test::Folder& folder, const std::vector<std::string>& memb
 /// A replay on a thread of its own.
 class RunningReplay {
  public:
-  explicit RunningReplay(const std::string& path) {
-    ReplayOptions options;
+  explicit RunningReplay(const std::string& path, ReplayOptions options = {}) {
     options.report = [this](const std::string& problem) { problems_.push_back(problem); };
     replay_.emplace(io_, Recording::open(path).value(), options);
     thread_ = std::thread([this] { io_.run(); });
@@ -126,8 +125,9 @@ class RunningReplay {
     boost::asio::post(io_, [this] { work_.reset(); });
     thread_.join();
   }
-  const std::string& url() const { return replay_->urls().at(0); }
-  std::string control_url() const { return url().substr(0, url().find('?')) + "?service=replay"; }
+  const std::string& url() const { return urls().at(0); }
+  const std::vector<std::string>& urls() const { return replay_->urls(); }
+  std::string control_url() const { return url().substr(0, url().find('?')) + "?service=" + replay_->control_name(); }
   const std::vector<std::string>& problems() const { return problems_; }
 
  private:
@@ -142,17 +142,24 @@ class RunningReplay {
 struct DevFile {
   rr::TypeRegistry types;
   RecordingWriter writer;
-  RecordedService service{"Dev", "rr+tcp://h/?service=Dev", "Dev", "com.dev.Dev"};
+  RecordedService service = {};
 
   explicit DevFile(const test::Folder& folder) : writer(RecordingWriter::create(folder.path("by hand.mcap")).value()) {
     REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+    add_service("Dev");
+  }
+  /// The members that follow are its.
+  void add_service(const std::string& name) {
+    service = {writer.free_label(name), "rr+tcp://h/?service=" + name, name, "com.dev.Dev"};
+    service.node.name = "com.dev.node";
+    service.node.id = rr::parse_node_id("{00112233-4455-6677-8899-aabbccddeeff}").value();
     service.definitions = {definition};
-    service.objects = {{"Dev", "com.dev.Dev"}};
+    service.objects = {{name, "com.dev.Dev"}};
     REQUIRE(writer.add_service(service));
   }
   std::uint16_t add(const char* name) {
     const auto* member = types.find_entity("com.dev.Dev")->find_member(name);
-    return writer.add_member(service, "Dev", "", *member, rr::named_type_schemas(types)).value();
+    return writer.add_member(service, service.service, "", *member, rr::named_type_schemas(types)).value();
   }
 };
 
@@ -362,6 +369,34 @@ TEST_CASE("before its first value, a wire or property that a replay goes back to
     control.call("seek", 0.0);
     CHECK(has_no_gain());
   }
+}
+
+TEST_CASE("services of the name that controls replays, and of one name at one node, are replayed") {
+  const test::Folder folder;
+  DevFile file(folder);
+  std::vector<std::uint16_t> gains{file.add("gain")};
+  for (const auto* name : {"replay", "replay_2", "Dev"}) {
+    file.add_service(name);
+    gains.push_back(file.add("gain"));
+  }
+  for (std::size_t i = 0; i < gains.size(); ++i) REQUIRE(file.writer.write(gains[i], {{"value", i}}, {}, {5, 0}));
+  REQUIRE(file.writer.close());
+  ReplayOptions options;
+  options.keeps_ids = GENERATE(false, true);
+  const RunningReplay replay(file.writer.path(), options);
+  REQUIRE(replay.urls().size() == gains.size());
+  CHECK_THAT(replay.control_url(), Catch::EndsWith("?service=replay_3"));
+  auto control = rr::connect(replay.control_url());
+  control.call("step", 10u);
+  const auto address = [&](std::size_t service) {
+    return replay.urls()[service].substr(0, replay.urls()[service].find('?'));
+  };
+  for (std::size_t i = 0; i < gains.size(); ++i)
+    CHECK(rr::connect(replay.urls()[i]).get("gain").to<std::size_t>().value() == i);
+  CHECK(address(1) == address(0));
+  CHECK(address(2) == address(0));
+  CHECK(address(3) != address(0));
+  CHECK(rr::connect(address(3) + "?service=replay_3").get("file").to_text().value() == file.writer.path());
 }
 
 TEST_CASE("a property that is slow to answer holds up no other") {

@@ -27,7 +27,8 @@ export interface ReplayBarProps {
 export function ReplayBar({ link, device, list }: ReplayBarProps) {
   const service = devicesOf(useStore(list.state))
     ?.find(({ name }) => name === device)
-    ?.services.find(({ type }) => type === TYPE);
+    ?.services.filter(({ type }) => type === TYPE)
+    .at(-1); // a recorded one, if there is one, has a name before it
   if (!service) return null;
   return <Bar link={link} from={[device, service.name].map(encodeURIComponent).join("/")} list={list} />;
 }
