@@ -105,7 +105,9 @@ class RecordRun {
     RecordListener listener;
     listener.begun = [this](const rr::Result<>& outcome) {
       if (!outcome) return fail(outcome.error());
-      if (++begun_ == recorders_.size()) begin_ = steady_clock::now();
+      if (++begun_ != recorders_.size()) return;
+      begin_ = steady_clock::now();
+      tell_least_size();
     };
     listener.problem = [](const std::string& problem) { std::cerr << "rrgate record: " << problem << "\n"; };
     listener.failed = [this](const rr::Error& error) { fail(error); };
@@ -120,6 +122,14 @@ class RecordRun {
       recorders_.push_back(std::make_shared<Recorder>(io_, writer_, address.url, how, listener));
       recorders_.back()->start(address.options);
     }
+  }
+  void tell_least_size() const {
+    const auto least = static_cast<double>(writer_.least_file_bytes()) / 1e6;
+    if (options_.max_size == 0 || options_.max_size >= least) return;
+    std::cerr << "rrgate record: --max-size " << options_.max_size << ": files become " << std::fixed
+              << std::setprecision(3) << least
+              << " MB large, as the definitions and schemas alone, which each of them has, take most of that\n"
+              << std::defaultfloat;
   }
   void fail(const rr::Error& error) {
     if (!failure_) failure_ = error;

@@ -169,7 +169,10 @@ rr::Result<> RecordingWriter::add_service(const RecordedService& service) {
     *known = texts;
   else
     services_.push_back(texts);
-  return writer_.add_metadata(recorded_service_name, texts);
+  const auto before = writer_.size();
+  auto added = writer_.add_metadata(recorded_service_name, texts);
+  preamble_bytes_ += writer_.size() - before;
+  return added;
 }
 
 rr::Result<std::uint16_t> RecordingWriter::add_member(const RecordedService& service, const std::string& object_path,
@@ -186,7 +189,9 @@ rr::Result<std::uint16_t> RecordingWriter::add_member(const RecordedService& ser
                       {"member", member.name},
                       {"kind", std::string(rr::member_kind_name(member.kind))}};
   if (member.kind != rr::MemberKind::event) channel.metadata["type"] = rr::format_type(member.type);
+  const auto before = writer_.size();
   if (auto put = put_channel(channel); !put) return put.error();
+  preamble_bytes_ += writer_.size() - before;
   topics_.push_back(channel.topic);
   channels_.push_back(std::move(channel));
   return static_cast<std::uint16_t>(channels_.size() - 1);
@@ -206,7 +211,7 @@ rr::Result<> RecordingWriter::put_channel(const Channel& channel) {
 
 rr::Result<> RecordingWriter::write(std::uint16_t channel, const rr::OrderedJson& message,
                                     std::optional<rr::TimeSpec> sent, rr::TimeSpec now) {
-  const bool is_full = options_.max_bytes != 0 && writer_.size() >= options_.max_bytes;
+  const bool is_full = options_.max_bytes != 0 && writer_.size() >= std::max(options_.max_bytes, least_file_bytes());
   if (is_full || writer_.index_bytes() >= options_.max_index_bytes)
     if (auto begun = begin_next_file(); !begun) return begun;
   const auto text = rr::write_json(message);
@@ -257,6 +262,7 @@ rr::Result<> RecordingWriter::begin_next_file() {
     if (auto added = writer_.add_metadata(recorded_service_name, service); !added) return added;
   for (const auto& channel : channels_)
     if (auto put = put_channel(channel); !put) return put;
+  preamble_bytes_ = writer_.size();
   return {};
 }
 

@@ -39,7 +39,8 @@ struct RecordedService {
 };
 
 struct RecordingOptions {
-  std::uint64_t max_bytes = 0;  ///< of one file, about; then the next one begins. 0: no limit
+  /// Of one file, about; then the next one begins. 0: no limit. Where it is less than least_file_bytes(), that counts.
+  std::uint64_t max_bytes = 0;
   /// The oldest go before a further one begins. 0: all stay.
   std::uint32_t kept_files = 0;
   std::deque<std::string> former = {};  ///< paths of older files that count among the kept ones, oldest first
@@ -83,6 +84,9 @@ class RecordingWriter {
   std::uint64_t message_count() const { return finished_messages_ + writer_.message_count(); }
   /// Of all files.
   std::uint64_t size() const { return finished_bytes_ + writer_.size(); }
+  /// How large a file becomes before the next begins: a quarter more than what stands before its messages, its services
+  /// with their definitions and its channels with their schemas. Else a low limit makes files of little else.
+  std::uint64_t least_file_bytes() const { return preamble_bytes_ + preamble_bytes_ / 4; }
   /// The file that is written now.
   const std::string& path() const { return writer_.path(); }
   const std::vector<std::string>& topics() const { return topics_; }
@@ -116,6 +120,7 @@ class RecordingWriter {
   McapTime shift_ = 0;  ///< of the clock, which was set back
   std::uint64_t finished_messages_ = 0;
   std::uint64_t finished_bytes_ = 0;
+  std::uint64_t preamble_bytes_ = writer_.size();  ///< of the file at hand: what stands before the messages
 };
 
 /// The schema of a member's messages, without references and choices, as tools read it that plot numbers. Text and

@@ -357,6 +357,14 @@ def test_a_long_recording_goes_on_in_further_files_and_the_oldest_go(create, tmp
     assert all(len(messages(file)) > 0 for file in files)
 
 
+def test_a_size_that_definitions_exceed_is_told_and_files_hold_messages_all_the_same(create, tmp_path):
+    done = subprocess.run([RRGATE, "record", create, "-o", tmp_path / "run.mcap", "--members", "state", "--duration", "2",
+                           "--max-size", "0.001"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and "--max-size 0.001: files become 0.0" in done.stderr, done
+    counts = [len(messages(file)) for file in sorted(tmp_path.glob("run*.mcap"))]
+    assert max(counts) > 5 and len(counts) < sum(counts) / 2
+
+
 def test_a_recording_ends_while_its_service_has_not_answered(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         silent.settimeout(REPLAY_DEADLINE)

@@ -247,6 +247,32 @@ TEST_CASE("a file whose index takes too much memory is followed by the next") {
   CHECK(files < 20);
 }
 
+TEST_CASE("a file holds more than the definitions and schemas, however low the limit is") {
+  const test::Folder folder;
+  Recorded robot;
+  RecordingOptions options;
+  options.max_bytes = 100;
+  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  const auto before = writer.size();
+  const auto least = writer.least_file_bytes();
+  CHECK(least == before + before / 4);
+  for (int i = 0; i < 1000; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+  REQUIRE(writer.close());
+  std::size_t files = 0;
+  for (const auto& each : std::filesystem::directory_iterator(std::filesystem::path(writer.path()).parent_path())) {
+    const auto recording = Recording::open(each.path().string()).value();
+    if (each.path() == writer.path()) continue;
+    CHECK(recording.message_count() > 5);
+    CHECK(recording.size() > least);
+    CHECK(recording.size() < 3 * least);
+    ++files;
+  }
+  CHECK(files > 5);
+}
+
 TEST_CASE("files of former runs count among those that are kept, and go before the next begins") {
   const test::Folder folder;
   RecordingOptions options;
