@@ -137,7 +137,6 @@ rr::OrderedJson recorded_schema(const rr::MemberDefinition& member, const rr::Or
 
 rr::Result<RecordingWriter> RecordingWriter::create(const std::string& path, RecordingOptions options) {
   auto complete = std::exchange(options.former, {});
-  drop_down_to(complete, options.kept_files);
   auto writer = begin_file(path, options);
   if (!writer) return writer.error();
   RecordingWriter out(path, std::move(options), std::move(*writer));
@@ -214,6 +213,7 @@ rr::Result<> RecordingWriter::write(std::uint16_t channel, const rr::OrderedJson
   const bool is_full = options_.max_bytes != 0 && writer_.size() >= std::max(options_.max_bytes, least_file_bytes());
   if (is_full || writer_.index_bytes() >= options_.max_index_bytes)
     if (auto begun = begin_next_file(); !begun) return begun;
+  if (writer_.message_count() == 0) drop_down_to(complete_, options_.kept_files);
   const auto text = rr::write_json(message);
   const auto time = time_to_log(to_mcap_time(now));
   McapMessage out{channel, channels_.at(channel).sequence, time, time, rr::as_bytes(text)};
@@ -251,7 +251,6 @@ bool RecordingWriter::drop_oldest() {
 rr::Result<> RecordingWriter::begin_next_file() {
   if (auto closed = writer_.close(); !closed) return closed;
   if (options_.kept_files != 0) complete_.push_back(writer_.path());
-  drop_down_to(complete_, options_.kept_files);
   auto next = begin_file(next_path(), options_);
   if (!next) return next.error();
   finished_messages_ += writer_.message_count();

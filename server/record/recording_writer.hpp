@@ -41,7 +41,7 @@ struct RecordedService {
 struct RecordingOptions {
   /// Of one file, about; then the next one begins. 0: no limit. Where it is less than least_file_bytes(), that counts.
   std::uint64_t max_bytes = 0;
-  /// The oldest go before a further one begins. 0: all stay.
+  /// The oldest go when a further one has its first message: one that stays empty takes the place of none. 0: all stay.
   std::uint32_t kept_files = 0;
   std::deque<std::string> former = {};  ///< paths of older files that count among the kept ones, oldest first
   std::string ring = {};                ///< what each file says it belongs to: see recorded_ring(). Empty: nothing

@@ -273,7 +273,7 @@ TEST_CASE("a file holds more than the definitions and schemas, however low the l
   CHECK(files > 5);
 }
 
-TEST_CASE("files of former runs count among those that are kept, and go before the next begins") {
+TEST_CASE("files of former runs count among those that are kept, and go when the next has a message") {
   const test::Folder folder;
   RecordingOptions options;
   options.max_bytes = 20'000;
@@ -284,12 +284,17 @@ TEST_CASE("files of former runs count among those that are kept, and go before t
   options.replaces = true;  // a folder stands in the way
   std::filesystem::create_directory(folder.path("a-2.mcap"));
   auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-  CHECK(writer.kept() == std::deque<std::string>{folder.path("3.mcap"), folder.path("4.mcap")});
+  CHECK(std::filesystem::exists(folder.path("1.mcap")));
   CHECK(recorded_ring(folder.path("a.mcap")) == "mine");
   Recorded robot;
   robot.service.label = "Robot";
   REQUIRE(writer.add_service(robot.service));
   const auto pose = robot.add(writer, "pose");
+  CHECK(writer.kept().size() == 4);
+  CHECK(std::filesystem::exists(folder.path("1.mcap")));
+  REQUIRE(writer.write(pose, value(0), {}, {0, 0}));
+  CHECK(writer.kept() == std::deque<std::string>{folder.path("3.mcap"), folder.path("4.mcap")});
+  CHECK(!std::filesystem::exists(folder.path("2.mcap")));
   rr::Result<> written;
   std::uint64_t size = 0;
   for (int i = 0; written; ++i) {
@@ -297,13 +302,13 @@ TEST_CASE("files of former runs count among those that are kept, and go before t
     written = writer.write(pose, value(i), {}, {i, 0});
   }
   CHECK_THAT(written.error().message, Catch::Contains("a-2.mcap: can't be written: Is a directory"));
-  CHECK(!std::filesystem::exists(folder.path("3.mcap")));
+  CHECK(std::filesystem::exists(folder.path("3.mcap")));
   CHECK(std::filesystem::exists(folder.path("4.mcap")));
   CHECK(std::filesystem::is_directory(folder.path("a-2.mcap")));
   CHECK(writer.size() < size * 3 / 2);  // not twice
   CHECK(recorded_ring(folder.path("4.mcap")).empty());
   CHECK(writer.drop_oldest());
-  CHECK(!std::filesystem::exists(folder.path("4.mcap")));
+  CHECK(!std::filesystem::exists(folder.path("3.mcap")));
 }
 
 TEST_CASE("what is no recording says so") {

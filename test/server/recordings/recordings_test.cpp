@@ -104,16 +104,13 @@ TEST_CASE("recordings: a ring of files goes on over a restart of the gateway") {
   made.recordings.follow_config();
   const auto begun = made.standing();
   CHECK(made.has("arm.Arm.20261120T083000123Z.mcap"));
-  CHECK_FALSE(made.has(former[0]));
-  CHECK_FALSE(made.has(former[1]));
-  CHECK(made.has(former[2]));
-  CHECK(made.has(former[3]));
+  for (const auto& name : former) CHECK(made.has(name));  // until there is a message, of which the device has none
   REQUIRE(begun.files.size() == 1);
 }
 
 TEST_CASE("recordings: a ring keeps its files while the gateway is started again and the device stays away") {
   RecordedArm made;
-  for (const auto* name : {&former[0], &former[1]}) made.ring_file(*name);
+  for (const auto* name : {&former[0], &former[1], &former[2]}) made.ring_file(*name);
   for (int start = 0; start < 3; ++start) {
     made.config.recordings.standing = {RecordedArm::wish(3)};
     made.recordings.follow_config();
@@ -123,8 +120,7 @@ TEST_CASE("recordings: a ring keeps its files while the gateway is started again
     made.recordings.follow_config();
     CHECK_FALSE(made.has(begun.name + ".mcap"));
   }
-  CHECK(made.has(former[0]));
-  CHECK(made.has(former[1]));
+  for (const auto* name : {&former[0], &former[1], &former[2]}) CHECK(made.has(*name));
 }
 
 TEST_CASE("recordings: what the configuration wants goes on at once where it says that the device is elsewhere") {
