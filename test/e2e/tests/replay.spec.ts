@@ -55,6 +55,15 @@ test("a replay is played, paused, set and taken to another time below its panels
     expect(recorded.x).toBeGreaterThan(0.3);
     await expect(page.locator('[data-pose="x"]')).toHaveText(`${recorded.x.toFixed(3)} m`);
 
+    // One message after the other, by the keyboard as well.
+    const sought = (await look()).position;
+    await bar.getByRole("button", { name: "Step" }).click();
+    await expect.poll(async () => (await look()).position).toBeGreaterThan(sought);
+    const stepped = (await look()).position;
+    await page.keyboard.press("Enter");
+    await expect.poll(async () => (await look()).position).toBeGreaterThan(stepped);
+    expect((await look()).playing).toBe(false);
+
     await bar.getByLabel("Repeat").click();
     await expect(bar.getByLabel("Repeat")).toBeChecked();
     expect((await look()).loop).toBe(true);

@@ -1,4 +1,4 @@
-// The time line of a device that is a replay: where it is, play and pause, speed, and going to another time.
+// The time line of a device that is a replay: where it is, play and pause, step, speed, and going to another time.
 // Layer: web/pages. Source: robdef/org.rrgate.replay.robdef.
 
 import { useEffect, useState } from "preact/hooks";
@@ -59,6 +59,9 @@ function Bar({ link, from, list }: { link: Link; from: string; list: DeviceList 
     <section class="replay-bar" aria-label={t("Replay")}>
       <button class="button" type="button" disabled={isOff} onClick={() => call(isPlaying ? "pause" : "play")}>
         {isPlaying ? t("Pause") : t("Play")}
+      </button>
+      <button class="button" type="button" disabled={isOff} onClick={() => call("step", 1)}>
+        {t("Step")}
       </button>
       <input
         class="replay-time"
