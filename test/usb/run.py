@@ -15,10 +15,8 @@ so too, which says whether the device is one:
 --kernel is a folder with boot/vmlinuz-* and lib/modules/* of Debian's linux-image package.
 """
 import argparse
-import gzip
 import itertools
 import json
-import os
 import pathlib
 import re
 import shlex
@@ -31,16 +29,14 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test/interop"))
+from guest import make_initrd, qemu_command  # noqa: E402
 GUEST_LIMIT = 240.0  # seconds; 40 are usual, more where other programs want the processors too
 MODULES = ["virtio_pci", "9pnet_virtio", "9p", "usbcore", "xhci_pci", "cuse"]
 PYTHON = ROOT / "build/deps/venv/bin/python"
 GATEWAY_PORT = 52990  # of the guest, which has no other network than its loopback
 
-INIT = r"""#!/bin/busybox sh
-/bin/busybox --install -s /bin; export PATH=/bin
-mount -t proc p /proc; mount -t sysfs s /sys; mount -t devtmpfs d /dev
-while read module; do insmod /modules/$module || echo "insmod: $module"; done < /modules/order
-mount -t 9p -o trans=virtio,version=9p2000.L,ro,msize=262144,cache=loose host /host
+INIT = r"""mount -t 9p -o trans=virtio,version=9p2000.L,ro,msize=262144,cache=loose host /host
 for folder in dev sys proc; do mount --bind /$folder /host/$folder; done
 mount -t tmpfs t /host/run; cp -r /given /host/run/given
 ip link set lo up
@@ -106,33 +102,6 @@ SCENARIO = [
 ]
 
 
-def make_initrd(path, kernel, version, given):
-    """busybox, the modules in the order in which they have to be loaded, /init, and what the guest is given."""
-    with tempfile.TemporaryDirectory() as scratch:
-        tree = pathlib.Path(scratch)
-        for folder in ("bin", "proc", "sys", "dev", "host", "modules"):
-            (tree / folder).mkdir()
-        shutil.copy("/bin/busybox", tree / "bin/busybox")
-        shutil.copytree(given, tree / "given")
-        (tree / "init").write_text(INIT)
-        (tree / "init").chmod(0o755)
-        order = []
-        for module in MODULES:
-            shown = subprocess.run(["/sbin/modprobe", "-d", kernel, "-S", version, "--show-depends", module], check=True,
-                                   capture_output=True, text=True).stdout
-            for line in shown.splitlines():
-                word, _, file = line.strip().partition(" ")
-                name = os.path.basename(file)
-                if word == "insmod" and name not in order:
-                    order.append(name)
-                    shutil.copy(file, tree / "modules" / name)
-        (tree / "modules/order").write_text("\n".join(order) + "\n")
-        names = "\0".join(str(file.relative_to(tree)) for file in sorted(tree.rglob("*")))
-        archive = subprocess.run(["cpio", "-o", "-H", "newc", "--quiet", "-0"], cwd=tree, input=names.encode(), check=True,
-                                 stdout=subprocess.PIPE).stdout
-    path.write_bytes(gzip.compress(archive, 1))
-
-
 def between(text, name):
     found = re.search(rf"^MARK {name} begin\n(.*?)^MARK {name} end( \d+)?$", text, re.DOTALL | re.MULTILINE)
     return found[1] if found else ""
@@ -164,10 +133,6 @@ class Run:
         emulator = self.start(self.build / "test/usb/rr-usb-emulator", bus, port, "interop.service",
                               stdout=subprocess.PIPE)
         emulator.stdout.readline()
-        image = sorted((self.kernel / "boot").glob("vmlinuz-*"))[-1]
-        version = image.name.removeprefix("vmlinuz-")
-        if not (self.kernel / "lib/modules" / version / "modules.dep.bin").exists():
-            subprocess.run(["/sbin/depmod", "-b", self.kernel, version], check=True)
         given = self.folder / "given"
         given.mkdir()
         url = f"rr+tcp://127.0.0.1:{GATEWAY_PORT}/?nodename=interop.service&service=interop"
@@ -179,15 +144,10 @@ class Run:
                                                          pattern=shlex.quote(self.pattern) if self.pattern else ""))
         (given / "reference.py").write_text(REFERENCE)
         initrd = self.folder / "initrd.gz"
-        make_initrd(initrd, self.kernel, version, given)
-        # Software emulation always: where /dev/kvm exists it may still not work.
-        qemu = self.start(
-            "qemu-system-x86_64", "-accel", "tcg", "-M", "q35", "-cpu", "max", "-m", "512", "-smp", "1", "-nographic",
-            "-no-reboot", "-nodefaults", "-serial", "stdio", "-monitor", "none", "-kernel", image, "-initrd", initrd,
-            "-append", "console=ttyS0 panic=-1 quiet",
-            "-virtfs", "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap",
-            "-device", "qemu-xhci", "-chardev", f"socket,id=bus,path={bus}", "-device", "usb-redir,chardev=bus",
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        make_initrd(initrd, INIT, MODULES, self.kernel, given)
+        qemu = self.start(*qemu_command(
+            initrd, "/", "-device", "qemu-xhci", "-chardev", f"socket,id=bus,path={bus}", "-device", "usb-redir,chardev=bus",
+            folder=self.kernel), stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         timer = threading.Timer(GUEST_LIMIT, qemu.kill)
         timer.start()
         text = qemu.stdout.read().decode("utf-8", "replace").replace("\r", "")
