@@ -43,7 +43,7 @@ with users, TLS, a dashboard and an interface for HTTP clients.")
 set(CPACK_DEBIAN_GATEWAY_PACKAGE_NAME rrgate)
 set(CPACK_DEBIAN_GATEWAY_PACKAGE_SECTION net)
 set(CPACK_DEBIAN_GATEWAY_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_GATEWAY_PACKAGE_DEPENDS adduser)
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_DEPENDS "adduser, procps")  # the unit reloads by /bin/kill
 set(CPACK_DEBIAN_GATEWAY_PACKAGE_RECOMMENDS ca-certificates)
 set(CPACK_DEBIAN_GATEWAY_PACKAGE_CONTROL_EXTRA
     "${PROJECT_SOURCE_DIR}/cmake/deb/conffiles;${PROJECT_SOURCE_DIR}/cmake/deb/postinst;${PROJECT_SOURCE_DIR}/cmake/deb/prerm;${PROJECT_SOURCE_DIR}/cmake/deb/postrm")

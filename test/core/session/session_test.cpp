@@ -264,11 +264,11 @@ TEST_CASE("messages above the limit are refused: before login 512 KiB, then the 
   pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
   CHECK(pair.completion(id));
   CHECK(pair.completion(pair.client->set_property("arm", "pose", big(1'600'000), pair.now)).error().code ==
-        ErrorCode::protocol_error);
+        ErrorCode::buffer_limit_violation);
   id = pair.client->get_property("arm", "pose", pair.now);
   pair.pump();
   pair.service->reply(pair.next_service<Called>().id, big(1'600'000), pair.now);
-  CHECK(pair.completion(id).error().code == ErrorCode::protocol_error);
+  CHECK(pair.completion(id).error().code == ErrorCode::buffer_limit_violation);
   CHECK(pair.client->state() == ClientState::connected);
 }
 
