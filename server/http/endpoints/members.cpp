@@ -1,5 +1,6 @@
 #include "server/http/endpoints/members.hpp"
 
+#include <algorithm>
 #include <charconv>
 
 #include "core/support/whole_number.hpp"
@@ -18,7 +19,10 @@ rr::awaitable<Response> value_response(const ObjectRequest& request, const Targe
   if (wanted.empty() || !is_image_type(type, target.types())) co_return co_await request.value_response(target, value);
   const auto work = value_or_throw(prepare_image(value, type, target.types(), wanted));
   auto room = request.writer().memory().sibling();
-  if (!room.resize(3 * work.data.bytes().size())) co_return no_memory_response();  // the rows, and what becomes of them
+  if (!room.resize(3 * work.data.bytes().size())) {
+    request.gateway().reject(Rejection::memory);
+    co_return no_memory_response();
+  }  // the rows, and what becomes of them
   const auto encode = [&work] { return encode_image(work); };
   auto bytes = value_or_throw(co_await request.gateway().workers().run(encode));
   auto response = text_response(200, wanted, std::move(bytes));
@@ -30,7 +34,7 @@ rr::awaitable<rr::Value> body_value(const ObjectRequest& request, const Target& 
   const auto make = [&](const rr::Json& body) {
     return rr::value_from_json(body, target.member->type, target.types(), request.form(), target.member->name);
   };
-  co_return value_or_throw(co_await request.from_body(make));
+  co_return value_or_throw(co_await request.from_body(is_apart(target.member->type), make));
 }
 
 /// A property, or a wire as a value: the newest in, the newest out.
@@ -208,7 +212,10 @@ rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectReq
                                                                  const rr::TypeRegistry& types) {
   if (member.parameters.empty() && request.request().message.body().empty()) co_return std::vector<rr::Value>();
   const auto make = [&](const rr::Json& body) { return arguments_from_json(body, member, types, request.form()); };
-  co_return co_await request.from_body(make);
+  const auto& parameters = member.parameters;
+  const bool are_apart =
+      std::all_of(parameters.begin(), parameters.end(), [](const auto& each) { return is_apart(each.type); });
+  co_return co_await request.from_body(are_apart, make);
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {

@@ -80,6 +80,10 @@ unsigned status_of(rr::ErrorCode code) {
   }
 }
 
+bool is_apart(const rr::TypeDefinition& type) {
+  return type.name.empty() && type.type != rr::DataType::varvalue_t;
+}
+
 SessionKey session_key(GatewayState& gateway, const Request& request, std::string service) {
   SessionKey key{std::move(service)};
   if (gateway.http_access().takes_basic()) return key;
@@ -177,12 +181,14 @@ rr::awaitable<rr::Result<>> ObjectRequest::admit_body(MemoryBudget::Charge& room
     needed = co_await gateway_.workers().run(measure);
   else
     needed = measure();
-  if (writer_.is_urgent(text.size()))
+  if (writer_.is_urgent(text.size())) {
     room.hold(needed);
-  else if (!room.resize(needed))
+  } else if (!room.resize(needed)) {
+    gateway_.reject(Rejection::memory);
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
                              "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
                                  " bytes becomes; try again in a moment");
+  }
   co_return rr::Result<>();
 }
 
@@ -200,7 +206,8 @@ rr::awaitable<Response> ObjectRequest::value_response(const Target& target, cons
     rr::add_key(named, name) = std::move(json);
     return named;
   };
-  if (rr::held_bytes(value) <= large_json_bytes) co_return co_await value_response(make());
+  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type))
+    co_return co_await value_response(make());
   auto json = co_await gateway_.workers().run(make);
   co_return co_await value_response(std::move(json));
 }
@@ -208,7 +215,10 @@ rr::awaitable<Response> ObjectRequest::value_response(const Target& target, cons
 rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
   const auto held = held_bytes(json);
   auto room = writer_.memory().sibling();
-  if (held > large_json_bytes && !room.resize(held)) co_return no_memory_response();
+  if (held > large_json_bytes && !room.resize(held)) {
+    gateway_.reject(Rejection::memory);
+    co_return no_memory_response();
+  }
   const bool is_cbor = wanted_ == BodyForm::cbor;
   // It is the worker that frees a large one, too: that takes as long as to write it.
   auto write = [json = std::move(json), is_cbor] {

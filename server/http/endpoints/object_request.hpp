@@ -38,6 +38,10 @@ struct Target {
   rr::awaitable<rr::Value> ask(rr::CallKind kind, rr::Value value) const;
 };
 
+/// Whether values of the type are read and written without the registry: it grows, on the gateway's thread, when a client
+/// opens an object whose definition comes later. Workers must not look into it.
+bool is_apart(const rr::TypeDefinition& type);
+
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
 SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
 /// A client of that session, for somebody from there. Where a login has to be judged by the device first, that is
@@ -71,11 +75,11 @@ class ObjectRequest {
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
 
-  /// What `make` makes of the body, read by Content-Type; on a worker where the body is large. Errors   those of
-  /// `make`; data_serialization_error; invalid_argument: another type; out_of_system_resource: there is no memory left
-  /// for it.
+  /// What `make` makes of the body, read by Content-Type; on a worker where the body is large, which calls `make` as
+  /// well where that `is_apart`. Errors   those of `make`; data_serialization_error; invalid_argument: another type;
+  /// out_of_system_resource: there is no memory left for it.
   template <class Make>
-  rr::awaitable<std::invoke_result_t<Make, const rr::Json&>> from_body(Make make) const {
+  rr::awaitable<std::invoke_result_t<Make, const rr::Json&>> from_body(bool is_apart, Make make) const {
     auto room = writer_.memory().sibling();
     if (const auto admitted = co_await admit_body(room); !admitted) co_return admitted.error();
     const auto work = [this, &make]() -> std::invoke_result_t<Make, const rr::Json&> {
@@ -84,7 +88,15 @@ class ObjectRequest {
       return make(*json);
     };
     if (!has_large_body()) co_return work();
-    co_return co_await gateway_.workers().run(work);
+    if (is_apart) co_return co_await gateway_.workers().run(work);
+    // Named: g++ 12 destroys twice what is made within an expression that waits.
+    const auto read = [this] { return read_body(); };
+    auto json = co_await gateway_.workers().run(read);
+    if (!json) co_return json.error();
+    auto made = make(*json);
+    auto free = [freed = std::move(*json)] { return freed.size(); };
+    co_await gateway_.workers().run(std::move(free));
+    co_return made;
   }
   bool has_bytes_body() const;
 
