@@ -350,6 +350,7 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
   std::size_t bytes = 0;
   bool has_ended = false;
   std::string left_out;  // why the next result is not there, and no other is asked for
+  rr::Result<> late;     // the step that was not answered in time
   while (!failed && left_out.empty() && results.size() < command.most && bytes < largest_results) {
     auto step = target.request(rr::CallKind::generator_next);
     step.generator = generator->id();
@@ -357,8 +358,8 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
     const auto stepped = co_await ask(*client, std::move(step), rest, check, nullptr);
     // What the device may take is also bounded by the configuration.
     if (!stepped || (!*stepped && stepped->error().code == rr::ErrorCode::request_timeout)) {
-      if (results.empty()) refuse_late();
       left_out = "the time for an answer was over";
+      late = rr::make_error(rr::ErrorCode::request_timeout, left_out);
       break;
     }
     const auto& next = *stepped;
@@ -381,8 +382,9 @@ McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr
     }
     reply_.note(std::to_string(results.size()) + " results so far");
   }
-  if (entry) entry->finish(failed ? rr::Result<>(*failed) : rr::Result<>());
-  if (!failed) generator->close_at_end();
+  if (entry) entry->finish(failed ? rr::Result<>(*failed) : late);
+  if (!late && results.empty()) refuse_late();
+  if (!failed && late) generator->close_at_end();  // a step under way is aborted: a close would wait for its end
   if (failed) {
     has_asked_device_ = true;
     throw rr::Exception(*failed);
