@@ -56,6 +56,22 @@ describe("a form of a property", () => {
   });
 });
 
+test("who has control waits for a long call by hand as long as others", async () => {
+  const call = vi.fn(() => Promise.resolve(null));
+  show(FormPanel, {
+    object: { call } as unknown as Remote,
+    members: [memberOf({ name: "home", kind: "function", type: "void" })],
+    definitions: new Definitions([]),
+    scope: "",
+    place: { device: "d", service: "s", object: "" },
+    settings: {},
+    change: () => undefined,
+  } as unknown as PanelProps);
+  await settle();
+  await press("Call home");
+  expect(call).toHaveBeenCalledWith("home", [], { timeout: 15_000 });
+});
+
 describe("a row of a function", () => {
   const objectOf = (...names: string[]): Remote =>
     ({

@@ -7,7 +7,7 @@ import { placeOf } from "../app/router";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
 import { Refusal } from "./refusal";
-import { RowHead, useAction } from "./row";
+import { PATIENT, RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
 
@@ -27,7 +27,7 @@ export function FunctionRow({ object, member, live, route }: MemberRowProps) {
     calling.run(async () => {
       const args = member.parameters.map((parameter, i) => readArgument(texts[i] ?? "", parameter));
       const begun = performance.now();
-      const result = await object.call(member.name, args);
+      const result = await object.call(member.name, args, PATIENT);
       const tookMs = performance.now() - begun;
       setAnswer({ text: member.type === "void" ? t("done") : formatValue(result), tookMs });
     });

@@ -9,7 +9,7 @@ import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
 import { Refusal } from "./refusal";
-import { RowHead, useAction } from "./row";
+import { PATIENT, RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
 
@@ -34,7 +34,7 @@ export function PropertyRow({ object, member, live, route }: MemberRowProps) {
   const write = (event: Event): void => {
     event.preventDefault();
     writing.run(async () => {
-      await object.set(member.name, parseInput(text, member.type));
+      await object.set(member.name, parseInput(text, member.type), PATIENT);
       if (readable) await readValue();
     });
   };

@@ -8,6 +8,9 @@ import { explain } from "../robot/remote";
 import type { Member, Remote } from "../robot/remote";
 import { flowing } from "../ui/words";
 
+/** What somebody calls by hand may take long; who holds a lease waits shorter where nothing is said. */
+export const PATIENT = { timeout: 15_000 };
+
 export interface MemberRowProps {
   object: Remote;
   member: Member;

@@ -13,7 +13,7 @@ import { formatValue } from "../values/format";
 import { readingsOf } from "../values/numeric";
 import { parseInput } from "../values/parse";
 import { Refusal } from "./refusal";
-import { RowHead, useAction } from "./row";
+import { PATIENT, RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
 import { initialText, ValueInput } from "./value_input";
 
@@ -80,7 +80,7 @@ function WireWriter({
   const sending = useAction();
   const send = (event: Event): void => {
     event.preventDefault();
-    sending.run(async () => object.poke(name, parseInput(text, type)));
+    sending.run(async () => object.poke(name, parseInput(text, type), PATIENT));
   };
   return (
     <>

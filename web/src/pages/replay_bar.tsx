@@ -25,12 +25,22 @@ export interface ReplayBarProps {
 
 /** Nothing for a device that is no replay. */
 export function ReplayBar({ link, device, list }: ReplayBarProps) {
-  const service = devicesOf(useStore(list.state))
-    ?.find(({ name }) => name === device)
-    ?.services.filter(({ type }) => type === TYPE)
-    .at(-1); // a recorded one, if there is one, has a name before it
+  const services = devicesOf(useStore(list.state))?.find(({ name }) => name === device)?.services ?? [];
+  const service = controlAmong(services.filter(({ type }) => type === TYPE));
   if (!service) return null;
   return <Bar link={link} from={[device, service.name].map(encodeURIComponent).join("/")} list={list} />;
+}
+
+/** Where services of the names "replay", "replay_2", ... were recorded, the one that controls has the first free name. */
+function controlAmong<S extends { name: string }>(services: readonly S[]): S | undefined {
+  const find = (wanted: string): S | undefined => services.find(({ name }) => name === wanted);
+  let found = find("replay");
+  for (let number = 2; found; number += 1) {
+    const next = find(`replay_${number}`);
+    if (!next) break;
+    found = next;
+  }
+  return found ?? services[0];
 }
 
 function Bar({ link, from, list }: { link: Link; from: string; list: DeviceList }) {

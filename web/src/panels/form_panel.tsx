@@ -4,7 +4,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Refusal } from "../members/refusal";
-import { useAction } from "../members/row";
+import { PATIENT, useAction } from "../members/row";
 import type { Member } from "../robot/remote";
 import { clockTime, flowing } from "../ui/words";
 import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
@@ -93,10 +93,10 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
       const begun = performance.now();
       const result =
         member.kind === "function"
-          ? await object.call(member.name, given)
+          ? await object.call(member.name, given, PATIENT)
           : member.kind === "property"
-            ? await object.set(member.name, given[0])
-            : await object.poke(member.name, given[0]);
+            ? await object.set(member.name, given[0], PATIENT)
+            : await object.poke(member.name, given[0], PATIENT);
       const hasResult = member.kind === "function" && member.type !== "void";
       const entry: Done = {
         time: Date.now(),
