@@ -548,6 +548,12 @@ it("finds services of a type among the devices of a gateway", async () => {
     const error = await failure(findServices({ gateway, type }));
     expect([error.code, error.message]).toEqual([ErrorCode.ConnectionError, expect.stringContaining(gateway)]);
   }
+  // Refused before anything is asked: nobody would hear what became of that.
+  const fetched = vi.fn(() => Promise.reject(new Error("asked")));
+  vi.stubGlobal("fetch", fetched);
+  const error = await failure(findServices({ gateway, type }, new AbortController() as never));
+  expect(error.code).toBe(ErrorCode.InvalidArgument);
+  expect(fetched).not.toHaveBeenCalled();
 });
 
 it("finds services whose root object implements the type", async () => {

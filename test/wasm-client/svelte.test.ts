@@ -107,6 +107,22 @@ it("keeps what a wire gave when the connection is lost, and says how old it is a
   await device.close();
 });
 
+it("says of a property that is shown again during an outage that it is not read", async () => {
+  const { service, options } = await startDevice();
+  const device = subscribe(url, options);
+  await device.client();
+  const speed = propertyStore(device, "speed");
+  const shown = speed.subscribe(() => undefined);
+  await until(() => get(speed).value === 0 && !get(speed).isBusy);
+  shown();
+  service.drop("gone");
+  await until(() => device.defaultClient === undefined);
+  const again = speed.subscribe(() => undefined);
+  expect(get(speed)).toMatchObject({ value: 0, error: { message: expect.any(String) as string }, isBusy: false });
+  again();
+  await device.close();
+});
+
 it("says that a property is not read while the connection is lost", async () => {
   const [first, second] = [await startDevice(), await startDevice()];
   const services = [first.service, second.service];

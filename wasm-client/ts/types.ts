@@ -403,7 +403,7 @@ declare const names: { readonly [name: string]: true };
  * call an error; `any` is the one type to which nothing is added.
  */
 // eslint-disable-next-line @typescript-eslint/no-explicit-any
-type ByName<T> = undefined extends typeof names.any ? any : T;
+type ByName<T> = undefined extends true ? T : undefined extends typeof names.any ? any : T; // without strict: T
 
 /**
  * A connected object: its members by name, and `$`. `RemoteObject<"Drive" | "Bump">` has these members alone; that also gives

@@ -112,11 +112,17 @@ export class Service implements ServiceOfObject {
   release(parent: ServedObject, objref: string, index?: string | number): void {
     const core = this.#free;
     const key = index === undefined ? undefined : keyOf(parent, objref, String(index));
+    // One pass: an object was found before those behind it. The core releases all spellings of an index at once.
+    const gone = new Set<string>();
+    const released = new Set<Found["key"]>();
     for (const [path, found] of this.#found) {
-      if (found.parentPath !== parent.path || found.objref !== objref) continue;
-      if (key !== undefined && found.key !== key) continue;
-      for (const known of this.#found.keys())
-        if (known === path || known.startsWith(`${path}.`)) this.#found.delete(known);
+      const isMeant =
+        found.parentPath === parent.path && found.objref === objref && (key === undefined || found.key === key);
+      if (!isMeant && !gone.has(found.parentPath)) continue;
+      gone.add(path);
+      this.#found.delete(path);
+      if (!isMeant || released.has(found.key)) continue;
+      released.add(found.key);
       core.release(path);
     }
     this.pump();

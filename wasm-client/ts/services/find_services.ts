@@ -2,7 +2,7 @@
 import { makeError, textOf } from "../errors.js";
 import type { FoundService, ServiceQuery } from "../find_services.js";
 import { headersOf } from "../platform.js";
-import { within } from "../within.js";
+import { checkSignal, within } from "../within.js";
 
 /* eslint-disable @typescript-eslint/naming-convention -- names of the gateway */
 interface Device {
@@ -14,8 +14,9 @@ interface Device {
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
-export function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
+export async function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
   const { gateway, timeout = 30_000 } = query;
+  checkSignal(signal);
   const ending = new AbortController();
   const late = `devices of the gateway ${gateway}: no answer`;
   return within(ask(query, ending.signal), { signal, timeout }, late).finally(() => ending.abort());

@@ -1,7 +1,7 @@
 // What pages show of a device, as stores that live while somebody looks: what the hooks of React, Vue and Svelte stand on.
 // Layer: wasm-client/ts.
 import type { Client } from "../connect.js";
-import { callSafely } from "../errors.js";
+import { callSafely, makeError } from "../errors.js";
 import type { MemberSubscriptionOptions } from "../member_subscription.js";
 import { ValueStore } from "../store.js";
 import type { Store } from "../store.js";
@@ -217,6 +217,12 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
 ): PropertyStore<ValueOf<T, K>, SettableOf<T, K>> {
   type V = ValueOf<T, K>;
   const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => {
+    // Shown again during an outage, with what it had before.
+    if (device && !device.defaultClient && store.getSnapshot().value !== undefined) {
+      const state = device.state.getSnapshot();
+      const reason = "reason" in state ? state.reason : undefined;
+      store.show({ ...store.getSnapshot(), error: reason ?? makeError("ConnectionError", "not connected") });
+    }
     const stops = [
       device?.onConnected(() => void refresh()),
       device?.onLost((error) => store.show({ ...store.getSnapshot(), error })),
