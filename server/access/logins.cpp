@@ -87,8 +87,8 @@ rr::awaitable<Logins::Judged> Logins::judge(rr::LoginAttempt attempt, ClientOrig
 }
 
 /// A network that has not failed lately, of these one that has the fewest passwords waiting: a flood of wrong ones
-/// keeps its own senders waiting, also while none of theirs has been judged. Of four turns one is the others' too:
-/// somebody may have mistyped.
+/// keeps its own senders waiting, also while none of theirs has been judged, where each sends several. Of four turns
+/// one is the others' too: somebody may have mistyped.
 std::deque<std::string>::iterator Logins::next_turn() {
   if (turns_taken_++ % 4 == 3) return turns_.begin();
   const auto now = steady_clock_now();

@@ -101,7 +101,11 @@ std::vector<std::string> parameters_of(const std::string& url, const std::string
 
 /// Gateways, as far as their services follow.
 std::vector<std::string> known_gateways() {
-  auto out = gateways_of_stored_logins();
+  std::vector<std::string> out;
+  try {
+    out = gateways_of_stored_logins();
+  } catch (const NotUnderstood&) {  // a command that needs the file says what is wrong with it
+  }
   for (auto& each : out) each += "/";
   return out;
 }

@@ -19,7 +19,7 @@ using std::chrono::steady_clock;
 struct Counts {
   double messages = 0;
   double bytes = 0;
-  double losses = 0;  ///< values that clients missed, also those that a newer one replaced
+  double losses = 0;  ///< values that were lost, or that a newer one replaced before they were handed on
 };
 
 struct DeviceLine {
