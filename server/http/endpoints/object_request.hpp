@@ -38,8 +38,8 @@ struct Target {
   rr::awaitable<rr::Value> ask(rr::CallKind kind, rr::Value value) const;
 };
 
-/// Whether values of the type are read and written without the registry: it grows, on the gateway's thread, when a client
-/// opens an object whose definition comes later. Workers must not look into it.
+/// Whether values of the type are read and written without the registry: it grows, on the gateway's thread, when a
+/// client opens an object whose definition comes later. Workers must not look into it.
 bool is_apart(const rr::TypeDefinition& type);
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.

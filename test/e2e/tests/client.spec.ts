@@ -56,7 +56,7 @@ test("10 MiB of doubles cross device, gateway and browser unharmed; more than th
     length: 1_310_720,
     wrong: -1,
     sum: (1_310_720 * 1_310_719) / 2,
-    tooMuch: "refused with 2",
+    tooMuch: "refused with 27",
     after: 5,
   });
 });
