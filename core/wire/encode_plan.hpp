@@ -112,9 +112,9 @@ class SizePass {
 /// The last check before writing: section 11's bounds of a whole message. Returns its size.
 inline Result<std::size_t> check_message_size(std::uint64_t size, const EncodeOptions& options) {
   if (size > options.max_message_size || size > max_structure_size)
-    return make_error(ErrorCode::buffer_limit_violation, "encode: message of " + std::to_string(size) +
-                                                             " bytes, the limit is " +
-                                                             std::to_string(options.max_message_size));
+    return make_error(
+        ErrorCode::buffer_limit_violation,
+        "encode: message has " + std::to_string(size) + " bytes, limit " + std::to_string(options.max_message_size));
   return static_cast<std::size_t>(size);
 }
 

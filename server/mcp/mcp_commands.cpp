@@ -287,7 +287,7 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
       has_asked_device_ = true;
       throw rr::Exception(answered->error());
     }
-    said = std::move(**answered);
+    said = **answered;
   }
   if (lease) {
     lease->renew();

@@ -356,7 +356,7 @@ TEST_CASE("the message size limit is exact") {
     CHECK(encode_error(message, {.max_message_size = vector.bytes.size()}) == "encoded");
     const auto size = std::to_string(vector.bytes.size());
     CHECK(encode_error(message, {.max_message_size = vector.bytes.size() - 1}) ==
-          "BufferLimitViolation: encode: message of " + size + " bytes, the limit is " +
+          "BufferLimitViolation: encode: message has " + size + " bytes, limit " +
               std::to_string(vector.bytes.size() - 1));
   }
 }

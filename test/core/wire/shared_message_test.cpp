@@ -118,6 +118,6 @@ TEST_CASE("each receiver's limit holds for a shared message") {
     CHECK(static_cast<bool>(done) == (limit == sent.size()));
     if (!done)
       CHECK(done.error().message ==
-            "encode: message of " + std::to_string(sent.size()) + " bytes, the limit is " + std::to_string(limit));
+            "encode: message has " + std::to_string(sent.size()) + " bytes, limit " + std::to_string(limit));
   }
 }
