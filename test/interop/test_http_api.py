@@ -188,7 +188,7 @@ def test_what_is_too_large_for_a_message_is_not_sent_and_said_to_be_that(gateway
     ask(gateway, "PUT", "/p_string", "short")
     large = ask(gateway, "PUT", "/p_string", "x" * 13_000_000)
     assert (large.status, large.json["error"]["name"]) == (413, "RobotRaconteur.BufferLimitViolation")
-    assert "the limit is" in large.json["detail"]
+    assert "bytes, limit " in large.json["detail"]
     assert ask(gateway, "GET", "/p_string").json == "short"
 
 
