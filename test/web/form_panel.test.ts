@@ -19,18 +19,20 @@ const memberOf = (of: Partial<Member>): Member => ({
   ...of,
 });
 
+const showForm = (object: Remote, member: Member) =>
+  show(FormPanel, {
+    object,
+    members: [member],
+    definitions: new Definitions([]),
+    scope: "",
+    place: { device: "d", service: "s", object: "" },
+    settings: {},
+    change: () => undefined,
+  } as unknown as PanelProps);
+
 describe("a form of a property", () => {
   const connected = (value: number) => ({ get: () => Promise.resolve(value) }) as unknown as Remote;
-  const start = () =>
-    show(FormPanel, {
-      object: connected(1),
-      members: [memberOf({})],
-      definitions: new Definitions([]),
-      scope: "",
-      place: { device: "d", service: "s", object: "" },
-      settings: {},
-      change: () => undefined,
-    } as unknown as PanelProps);
+  const start = () => showForm(connected(1), memberOf({}));
   const field = () => find<HTMLInputElement>("input.field");
 
   test("shows on each connection what the device has then", async () => {
@@ -58,15 +60,7 @@ describe("a form of a property", () => {
 
 test("who has control waits for a long call by hand as long as others", async () => {
   const call = vi.fn(() => Promise.resolve(null));
-  show(FormPanel, {
-    object: { call } as unknown as Remote,
-    members: [memberOf({ name: "home", kind: "function", type: "void" })],
-    definitions: new Definitions([]),
-    scope: "",
-    place: { device: "d", service: "s", object: "" },
-    settings: {},
-    change: () => undefined,
-  } as unknown as PanelProps);
+  showForm({ call } as unknown as Remote, memberOf({ name: "home", kind: "function", type: "void" }));
   await settle();
   await press("Call home");
   expect(call).toHaveBeenCalledWith("home", [], { timeout: 15_000 });
