@@ -373,57 +373,64 @@ TEST_CASE("users that come, go or change are recorded when their file is read an
   CHECK(lines[2]["detail"] == "dave: roles viewer,operator");
 }
 
-TEST_CASE("sessions that log in at once with one password are each recorded") {
-  Files files;
-  files.write("users", Files::user("alice", "one", "viewer"));
-  Access access(with_users(files));
-  REQUIRE(access.load());
-  boost::asio::io_context io{1};
-  const auto work = boost::asio::make_work_guard(io);
-  Logins logins(io.get_executor(), access);
-  int answered = 0;
-  const auto judge = [&](const std::string& client, Logins::Of of) {
+namespace {
+
+/// A gateway's logins, of which alice's password is "one".
+struct LoginsOfAlice {
+  LoginsOfAlice() {
+    files.write("users", Files::user("alice", "one", "viewer"));
+    REQUIRE(access.load());
+  }
+
+  void judge(std::string_view password, ClientOrigin from, Logins::Of of, Logins::Done done) {
     rr::LoginAttempt attempt;
     attempt.username = "alice";
-    attempt.credentials.items.emplace_back("password", rr::Value(std::string_view("one")));
-    logins.judge(std::move(attempt), {.client = client, .network = "192.0.2.1", .face = Face::native}, of,
-                 [&](const Logins::Judged& user) {
-                   CHECK(user);
-                   ++answered;
-                 });
+    attempt.credentials.items.emplace_back("password", rr::Value(password));
+    logins.judge(std::move(attempt), std::move(from), of, std::move(done));
+  }
+
+  Files files;
+  Access access{with_users(files)};
+  boost::asio::io_context io{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work{io.get_executor()};
+  Logins logins{io.get_executor(), access};
+};
+
+}  // namespace
+
+TEST_CASE("sessions that log in at once with one password are each recorded") {
+  LoginsOfAlice alice;
+  int answered = 0;
+  const auto judge = [&](const std::string& client, Logins::Of of) {
+    alice.judge("one", {.client = client, .network = "192.0.2.1", .face = Face::native}, of,
+                [&](const Logins::Judged& user) {
+                  CHECK(user);
+                  ++answered;
+                });
   };
   for (const auto* client : {"192.0.2.1:1", "192.0.2.1:2", "192.0.2.1:3"}) judge(client, Logins::Of::session);
   judge("192.0.2.1:4", Logins::Of::request);  // one with each request: those are not recorded
-  while (answered < 4 && io.run_one_for(std::chrono::seconds(10)) > 0) continue;
+  while (answered < 4 && alice.io.run_one_for(std::chrono::seconds(10)) > 0) continue;
   CHECK(answered == 4);
   std::vector<std::string> clients;
-  for (const auto& line : files.audit(access))
+  for (const auto& line : alice.files.audit(alice.access))
     if (line["event"] == "login") clients.push_back(line["client"]);
   CHECK(clients == std::vector<std::string>{"192.0.2.1:1", "192.0.2.1:2", "192.0.2.1:3"});
 }
 
 TEST_CASE("a right password does not wait for a flood of others, also while none of them has been judged") {
-  Files files;
-  files.write("users", Files::user("alice", "one", "viewer"));
-  Access access(with_users(files));
-  REQUIRE(access.load());
-  boost::asio::io_context io{1};
-  const auto work = boost::asio::make_work_guard(io);
-  Logins logins(io.get_executor(), access);
+  LoginsOfAlice alice;
   int refused = 0;
   bool is_in = false;
   const auto judge = [&](const std::string& network, const std::string& password, const Logins::Done& done) {
-    rr::LoginAttempt attempt;
-    attempt.username = "alice";
-    attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(password)));
-    logins.judge(std::move(attempt), {.client = network + ":1", .network = network, .face = Face::native},
-                 Logins::Of::request, done);
+    alice.judge(password, {.client = network + ":1", .network = network, .face = Face::native}, Logins::Of::request,
+                done);
   };
   for (int i = 0; i < 150; ++i)
     judge("192.0.2." + std::to_string(i % 50), "guess " + std::to_string(i),
           [&](const Logins::Judged& user) { refused += user ? 0 : 1; });
   judge("198.51.100.1", "one", [&](const Logins::Judged& user) { is_in = user.has_value(); });
-  while (!is_in && refused < 50 && io.run_one_for(std::chrono::seconds(10)) > 0) continue;
+  while (!is_in && refused < 50 && alice.io.run_one_for(std::chrono::seconds(10)) > 0) continue;
   CHECK(is_in);
   CHECK(refused <= 2);  // what was under way, and the turn of those that have failed
 }
