@@ -6,13 +6,10 @@
 // With "page" in the line, the page is loaded from that origin instead; an error in the page is told as {"page_error"}.
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
-import { createRequire } from "node:module";
 import { createInterface } from "node:readline";
+import { launchChromium } from "./browser.mjs";
 
 const repository = new URL("../../../", import.meta.url);
-const e2e = new URL("test/e2e/", repository);
-const { chromium } = createRequire(new URL("package.json", e2e))("@playwright/test");
-const launch = JSON.parse(await readFile(new URL("chromium.json", e2e), "utf8"));
 
 // The package as it is published, and the steps; with the strictest policy that its README promises to live with.
 const files = /^\/(wasm-client\/dist\/[\w./-]+|test\/interop\/js\/steps\.mjs)$/;
@@ -37,7 +34,7 @@ const server = createServer(async (request, response) => {
 await new Promise((resolve) => server.listen(Number(process.argv[2]), "127.0.0.1", resolve));
 const origin = `http://127.0.0.1:${server.address().port}`;
 
-const browser = await chromium.launch({ ...launch, executablePath: process.env["CHROMIUM"] ?? launch.executablePath });
+const browser = await launchChromium();
 const page = await browser.newPage();
 let errors = [];
 page.on("pageerror", (error) => errors.push(String(error)));
