@@ -94,9 +94,12 @@ def answer_of(gateway, port, path, **how):
 def test_nothing_tells_where_it_was_built():
     debs = sorted(PACKAGES.glob("*_amd64.deb"))
     assert [deb.name.split("_")[0] for deb in debs] == ["rrgate-dev", "rrgate"]
-    for deb in debs:
-        files = subprocess.run(["dpkg-deb", "--fsys-tarfile", deb], capture_output=True, check=True, timeout=120).stdout
-        assert str(ROOT).encode() not in files, deb.name
+    files = {deb.name: subprocess.run(["dpkg-deb", "--fsys-tarfile", deb], capture_output=True, check=True, timeout=120).stdout
+             for deb in debs}
+    (client,) = PACKAGES.glob("rrgate-client-*.tgz")
+    files[client.name] = gzip.decompress(client.read_bytes())
+    for name, content in files.items():
+        assert str(ROOT).encode() not in content, name
 
 
 def header_packages():
