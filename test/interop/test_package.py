@@ -412,6 +412,22 @@ def test_systemd_runs_it_in_the_units_sandbox(root, tmp_path):
     assert said["denied"] == [], "what the unit forbids, it needs"
 
 
+def test_purging_leaves_what_root_has_made(root):
+    """The last of those that want the package."""
+    links = [root.path(f"/etc/systemd/system/{target}.target.wants/rrgate.{kind}")
+             for target, kind in (("multi-user", "service"), ("sockets", "socket"))]
+    for link in links:  # as systemctl enable makes them
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.unlink(missing_ok=True)
+        link.symlink_to(f"/lib/systemd/system/{link.name}")
+    made = root.path("/etc/rrgate/made")
+    made.touch()
+    root.run("apt", "purge", "-y", "rrgate")
+    left = {"/" + str(path.relative_to(root.folder)) for path in root.folder.rglob("*rrgate*") if not path.is_relative_to(root.path("/proc"))}
+    assert left - {f"/{deb.name}" for deb in root.folder.glob("*.deb")} == {"/etc/rrgate"}
+    assert made.exists()
+
+
 def test_the_unit_of_another_prefix_names_its_program(tmp_path):
     subprocess.run(["cmake", "--install", BUILD, "--prefix", tmp_path / "here", "--component", "unit"], check=True,
                    capture_output=True, timeout=60)
