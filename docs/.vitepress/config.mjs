@@ -76,6 +76,7 @@ export default defineConfig({
   outDir: site,
   cacheDir: path.join(build, "docs-cache"),
   metaChunk: true,
+  buildConcurrency: 1, // pages enter the index of the search one after another, in the same order each time
   appearance: { disableTransition: false }, // which takes a style inside of the page
   head: [
     ["link", { rel: "icon", href: `${base}icon.svg` }],
