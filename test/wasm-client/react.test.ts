@@ -1,8 +1,9 @@
 // rrgate-client/react in React, strict mode included: it mounts everything twice.
-import { act, createElement, StrictMode } from "react";
+import { act, createElement, StrictMode, Suspense, use } from "react";
 import { Window } from "happy-dom";
 import "../../wasm-client/dist/node.js";
 import { useCall, useDevice, useEvent, useProperty, useWire } from "../../wasm-client/dist/react/react.js";
+import type { DeviceState } from "../../wasm-client/dist/react/react.js";
 import { startDevice, until, url } from "./framework_device.js";
 
 const window = new Window();
@@ -60,6 +61,36 @@ it("shows a device, its wires, properties, events and calls", async () => {
   await act(() => until(() => last?.level.isConnected === false));
   expect(last?.level).toMatchObject({ value: 42, isConnected: false });
 
+  act(() => root.unmount());
+  await until(() => service.isClosed);
+});
+
+it("suspends what is below until the device is connected", async () => {
+  const { service, options } = await startDevice();
+  let connect!: () => void;
+  const isPlugged = new Promise<void>((resolve) => (connect = resolve));
+  const urlOnceThere = async () => {
+    await isPlugged;
+    return url;
+  };
+  const Speed = ({ device }: { device: DeviceState }) => {
+    const robot = use(device.ready);
+    return createElement("p", null, `${robot.$.type} ${device.state.status}`);
+  };
+  const Panel = () => {
+    const device = useDevice(urlOnceThere, options);
+    return createElement(Suspense, { fallback: device.state.status }, createElement(Speed, { device }));
+  };
+  const root = createRoot(document.body);
+  const shows = (text: string) => act(() => until(() => document.body.textContent === text));
+
+  await act(async () => root.render(createElement(StrictMode, null, createElement(Panel))));
+  await shows("connecting");
+  connect();
+  await shows("test.framework.Robot connected");
+  act(() => service.drop("gone")); // there is nobody else to connect to: the first client is no reason to wait again
+  await act(() => until(() => !document.body.textContent.endsWith(" connected")));
+  expect(document.body.textContent).toContain("test.framework.Robot ");
   act(() => root.unmount());
   await until(() => service.isClosed);
 });

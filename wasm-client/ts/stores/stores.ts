@@ -27,6 +27,8 @@ export interface DeviceState<T = RemoteObject> {
   readonly client: Client<T> | undefined;
   readonly subscription: Subscription<T> | undefined;
   readonly state: SubscriptionState;
+  /** Settles with the first `client`; the same promise as long as the device is wanted. Never rejects. */
+  readonly ready: Promise<Client<T>>;
 }
 
 /** What a wire gave last. It stays when the connection is lost: `isConnected` and `receivedAt` tell what it is worth. */
@@ -150,19 +152,28 @@ class LiveStore<T> implements View<T> {
 
 /** Connected while somebody looks. */
 export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOptions): View<DeviceState<T>> {
-  const none: DeviceState<T> = { client: undefined, subscription: undefined, state: { status: "connecting" } };
+  let [none, isReady] = unconnected<T>();
   const store: LiveStore<DeviceState<T>> = new LiveStore(none, () => {
     const subscription = subscribe<T>(urls, options);
-    const stop = subscription.state.subscribe((state) =>
-      store.show({ client: subscription.defaultClient, subscription, state }),
-    );
+    const stop = subscription.state.subscribe((state) => {
+      const client = subscription.defaultClient;
+      if (client) isReady(client);
+      store.show({ ...none, client, subscription, state });
+    });
     return () => {
       stop();
+      [none, isReady] = unconnected();
       store.show(none);
       void subscription.close();
     };
   });
   return store;
+}
+
+function unconnected<T>(): [DeviceState<T>, (client: Client<T>) => void] {
+  let isReady!: (client: Client<T>) => void;
+  const ready = new Promise<Client<T>>((resolve) => (isReady = resolve));
+  return [{ client: undefined, subscription: undefined, state: { status: "connecting" }, ready }, isReady];
 }
 
 /** What a wire gave last, and whether that can still be so. */
