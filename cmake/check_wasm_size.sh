@@ -30,7 +30,7 @@ find_files() {
 mapfile -t files < <(find_files -not -path "$directory/usb/*" -not -path "$directory/lease/*" -not -path "$directory/definition/*" \
   -not -path "$directory/services/*" -not -path "$directory/serve/*" -not -path "$directory/losses/*" -not -path "$directory/stores/*" \
   -not -path "$directory/worker/*" -not -path "$directory/react/*" -not -path "$directory/svelte/*" -not -path "$directory/vue/*" -not -name inline.js -not -name internal.js \
-  -not -name worker.js -not -name worker_thread.js)
+  -not -name thread.js -not -name worker.js -not -name worker_thread.js)
 mapfile -t usb_files < <(find_files -path "$directory/usb/*")
 mapfile -t definition_files < <(find_files -path "$directory/definition/*")
 mapfile -t serve_files < <(find_files -path "$directory/serve/*")
@@ -38,7 +38,7 @@ mapfile -t service_files < <(find_files -path "$directory/services/*")
 mapfile -t framework_files < <(for name in stores react svelte vue; do find_files -path "$directory/$name/*"; done)
 mapfile -t losses_files < <(find_files -path "$directory/losses/*")
 mapfile -t lease_files < <(find_files -path "$directory/lease/*")
-mapfile -t worker_files < <(find_files \( -path "$directory/worker/*" -o -name worker.js -o -name worker_thread.js \) -not -name host.js)
+mapfile -t worker_files < <(find_files \( -path "$directory/worker/*" -o -name thread.js -o -name worker.js -o -name worker_thread.js \) -not -name host.js)
 check client "${2:-120}" "${files[@]}"
 check "USB part" "${3:-20}" "${usb_files[@]}"
 check "part for leases" 2 "${lease_files[@]}"

@@ -59,6 +59,7 @@ it("loads two scripts in a page", () => {
     "inline.js",
     "internal.js",
     "node.js",
+    "thread.js",
     "worker.js",
     "worker_thread.js",
   ]);
@@ -67,11 +68,12 @@ it("loads two scripts in a page", () => {
 
 it("has what runs in a worker in one file, which bundlers find", () => {
   expect(manifest.exports["./worker"]).toMatchObject({ default: "./dist/worker.js" });
-  expect(read("worker.js")).toContain('new Worker(new URL("./worker_thread.js",import.meta.url),{type:"module"})');
+  expect(read("thread.js")).toContain('new Worker(new URL("./worker_thread.js",import.meta.url),{type:"module"})');
   expect(read("worker_thread.js")).toContain('new URL("./rrgate.wasm",import.meta.url)');
   expect(read("worker_thread.js")).not.toMatch(/\bimport\b(?!\.meta)|\bfrom"/);
   expect(read("client.js")).not.toContain("/worker");
-  for (const file of ["worker.js", "worker/remote_core.js", "worker/passage.js"])
+  expect(read("client.js").match(/.{10}thread\.js/g)).toEqual(['import("./thread.js']); // for who says `worker: true`
+  for (const file of ["thread.js", "worker.js", "worker/passage.js"])
     expect(read(file), file).not.toContain("/host.js");
 });
 

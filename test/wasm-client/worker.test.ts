@@ -6,7 +6,7 @@ import type { ConnectOptions } from "../../wasm-client/dist/node.js";
 import * as worker from "../../wasm-client/dist/worker.js";
 import { failure, settle, TestService } from "./service.js";
 import type { NamedObject } from "./service.js";
-import { connect } from "./thread_in_place.js";
+import { connect, proofOf } from "./thread_in_place.js";
 
 const definition = `service test.worker
 stdver 0.10
@@ -90,6 +90,19 @@ it("finds objects by any index, as the core writes it", async () => {
     expect(await found["name"]!.get()).toBe(`named ${index}`);
     expect(await robot.$.find(found.$.path)).toBe(found);
   }
+});
+
+it("is had by an option of connect() and subscribe(), too", async () => {
+  const inPage = vi.spyOn(Core, "create");
+  for (const open of [page.connect, (...args: Parameters<typeof page.connect>) => page.subscribe(...args).client()]) {
+    const other = await TestService.start({ definitions: [definition], root: "test.worker.Root" });
+    const asked = (await open(url, { ...proofOf(other.transport), worker: true })) as NamedObject;
+    await asked["speed"]!.set(2.5);
+    expect(await asked["speed"]!.get()).toBe(2.5);
+    await asked.$.close();
+  }
+  expect(inPage.mock.contexts.length).toBe(2); // the worker's, which is in this thread
+  inPage.mockRestore();
 });
 
 it("cannot use a transport of the page", async () => {

@@ -26,7 +26,7 @@ const entries = [
 const served = /\/wasm-client\/ts\/serve\/(?!node\.ts$)/;
 /** What a worker does is in a script of its own (below); here, only the tests look at it. */
 const host = /\/wasm-client\/ts\/worker\/(?:host|outbox|serve_thread)\.ts$/;
-const remote = /\/wasm-client\/ts\/worker\/remote_core\.ts$/;
+const thread = /\/wasm-client\/ts\/worker\/(?:thread|remote_core)\.ts$/;
 const passage = /\/wasm-client\/ts\/worker\/passage\.ts$/;
 /** What all entries have in common: one file of it, whoever loads it. */
 const shared =
@@ -78,8 +78,8 @@ await build(entries, {
     { name: "client", test: shared },
     { name: "serve/device", test: served },
     { name: "worker/passage", test: passage },
-    { name: "worker/remote_core", test: remote },
     { name: "worker/host", test: host },
+    { name: "thread", test: thread },
   ],
 });
 await build(["worker_thread"], false);

@@ -3,7 +3,7 @@ import { makeError } from "./errors.js";
 import { ObjectTree } from "./object.js";
 import { checkTimeout, Session } from "./session.js";
 import type { Proof } from "./platform.js";
-import type { CoreTransport, OpenCoreTransport, OpenTransport, Transport } from "./transport.js";
+import type { CoreTransport, OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parseServiceUrl } from "./url.js";
 import { openUsb } from "./usb_devices.js";
@@ -38,6 +38,8 @@ export interface ConnectOptions extends Proof {
   stringTable?: boolean | undefined;
   /** Carries the bytes instead of a WebSocket or a USB device. */
   transport?: OpenTransport | undefined;
+  /** Has protocol, WebSocket and WebAssembly in a worker, as rrgate-client/worker; not where there is a `transport`. */
+  worker?: boolean | undefined;
 }
 
 const defaultConnectTimeout = 30_000;
@@ -87,21 +89,25 @@ export async function connectWith<T>(
     throw makeError("InvalidArgument", "found a password or credentials without username");
   }
 
-  const own: OpenCoreTransport | undefined = options.transport;
-  if (!own?.hasCore) void preload().catch(() => undefined); // while the socket opens; Core.create() says what is wrong
+  if (!options.worker) void preload().catch(() => undefined); // while the socket opens; Core.create() says what is wrong
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
-  signal?.addEventListener("abort", abort, { once: true });
+  signal?.addEventListener("abort", abort);
   let where = "the function that gives the URL";
   const timer = after(timeout, () =>
     attempt.fail(makeError("RequestTimeout", `${where}: no session within ${timeout} ms`)),
   );
   try {
-    const given = typeof url === "function" ? await attempt.unlessFailed(Promise.resolve().then(url)) : url;
+    const given = typeof url === "function" ? await attempt.unlessFailed((async () => url())()) : url;
     const { address, service, nodeId, nodeName } = parseServiceUrl(given);
     where = address.host || address.href;
-    const openSocket: OpenTransport = (to, listener) => openWebsocket(to, listener, options);
-    const open = options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openSocket);
+    const open: OpenTransport =
+      options.transport ??
+      (options.worker
+        ? (await attempt.unlessFailed(import("./worker/thread.js"))).openInWorker(options)
+        : address.protocol === "rr+usb:"
+          ? openUsb
+          : (to, listener) => openWebsocket(to, listener, options));
     const { createCore = Core.create } = await attempt.open(address, open);
     const core = await attempt.unlessFailed(
       createCore({

@@ -56,7 +56,7 @@ function kindOf(value: unknown): number {
 
 /** Members that the object or its class brings; not what every object has ("constructor"). */
 function fieldOf(object: Dictionary, name: string): unknown {
-  if (Object.prototype.hasOwnProperty.call(object, name)) return object[name];
+  if (Object.hasOwn(object, name)) return object[name];
   return name in object && !(name in Object.prototype) ? object[name] : undefined;
 }
 

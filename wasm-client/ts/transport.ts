@@ -25,6 +25,3 @@ export interface TransportListener {
 }
 
 export type OpenTransport = (url: URL, listener: TransportListener) => Transport | Promise<Transport>;
-
-/** `hasCore`: of what it opens, each is a CoreTransport. */
-export type OpenCoreTransport = OpenTransport & { readonly hasCore?: true };

@@ -36,6 +36,6 @@ export function subscribe<T = RemoteObject>(
 }
 
 function inWorker<O extends ConnectOptions>(options: O): O {
-  if (!options.transport) return { ...options, transport: openInWorker(options) };
+  if (!options.transport) return { ...options, worker: true, transport: openInWorker(options) };
   throw makeError("InvalidArgument", "transport: a worker can't use one of the page; use connect() of rrgate-client");
 }

@@ -23,16 +23,17 @@ test.beforeAll(async () => {
 test.afterAll(() => service?.stop());
 
 inEachEngine((at) => {
-  for (const [scheme, entry, how] of [
+  for (const [scheme, entry, how, worker] of [
     ["http", "index.js", "ws"],
     ["https", "index.js", "wss"],
     ["http", "worker.js", "ws in a worker"],
     ["https", "worker.js", "wss in a worker"],
+    ["http", "index.js", "ws in a worker of connect()", true],
   ] as const) {
     test(`the client calls, reads, listens and sends by ${how}`, async () => {
       const visitor = at();
       await visitor.open(service.url.replace("http", scheme));
-      expect(await visitor.run(useAllMembers, entry)).toEqual({
+      expect(await visitor.run(useAllMembers, entry, worker ?? false)).toEqual({
         called: 5,
         refused: "not today",
         set: "für alle",
@@ -47,10 +48,10 @@ inEachEngine((at) => {
   }
 });
 
-/** Runs in the page. `entry`: of the client. */
-async function useAllMembers(entry: string): Promise<object> {
+/** Runs in the page. `entry`: of the client; `worker`: option of connect(). */
+async function useAllMembers(entry: string, worker: boolean): Promise<object> {
   const { connect } = await import(new URL(entry, location.href).href);
-  const device = await connect(new URL("/devices/big?service=interop", location.href));
+  const device = await connect(new URL("/devices/big?service=interop", location.href), { worker });
   const called: number = await device.add(2, 3);
   const refused: string = await device.fail("custom", "not today").catch((error: Error) => error.message);
   await device.p_string.set("für alle");

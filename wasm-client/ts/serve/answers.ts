@@ -119,7 +119,7 @@ export function childOf(object: ServedObject, member: string, index: string | un
   if (typeof given === "function") child = (given as (key: unknown) => unknown).call(object.implementation, key);
   else if (given instanceof Map) child = given.get(key);
   else if (key !== undefined && typeof given === "object" && given !== null) {
-    child = Object.prototype.hasOwnProperty.call(given, key) ? (given as Implementation)[key] : undefined;
+    child = Object.hasOwn(given, key) ? (given as Implementation)[key] : undefined;
   }
   if (typeof child === "object" && child !== null && !(child instanceof Promise)) return child as Implementation;
   if (child instanceof Promise)
@@ -137,7 +137,7 @@ export function keyOf(object: ServedObject, objref: string, index: string | unde
 function accessorOf(value: unknown): Accessor | undefined {
   if (typeof value !== "object" || value === null) return undefined;
   const isFunction = (name: "get" | "set") =>
-    Object.prototype.hasOwnProperty.call(value, name) && typeof (value as Accessor)[name] === "function";
+    Object.hasOwn(value, name) && typeof (value as Accessor)[name] === "function";
   return isFunction("get") || isFunction("set") ? value : undefined;
 }
 

@@ -1,7 +1,7 @@
 // The worker of a page, and connections by it. Layer: wasm-client/ts/worker.
 import { makeError, RobotRaconteurError, textOf } from "../errors.js";
 import type { Proof } from "../platform.js";
-import type { CoreTransport, OpenCoreTransport, OpenTransport } from "../transport.js";
+import type { CoreTransport, OpenTransport } from "../transport.js";
 import type { Core, InitOptions } from "../wasm_module.js";
 import type { FromHost, ToHost, ToThread } from "./messages.js";
 import { copyOf, restore, weigh } from "./passage.js";
@@ -33,8 +33,8 @@ export async function preload(): Promise<void> {
 }
 
 /** Transports whose socket and core are in the worker. */
-export function openInWorker({ token, headers }: Proof): OpenCoreTransport {
-  const open: OpenTransport = async (url, listener) => {
+export function openInWorker({ token, headers }: Proof): OpenTransport {
+  return async (url, listener) => {
     const thread = await startThread();
     const { port1: port, port2 } = new MessageChannel();
     const say = (message: ToHost, transfer: ArrayBuffer[] = []) => port.postMessage(message, transfer);
@@ -82,7 +82,6 @@ export function openInWorker({ token, headers }: Proof): OpenCoreTransport {
       },
     } satisfies CoreTransport;
   };
-  return Object.assign(open, { hasCore: true } as const);
 }
 
 const nothing = new Uint8Array(0);
