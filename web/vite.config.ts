@@ -13,6 +13,12 @@ import { licences, wasmNotices } from "../cmake/notices.mjs";
 
 const gateway = loadEnv("", ".", "RRGATE_")["RRGATE_URL"] ?? "http://127.0.0.1:8080";
 
+// What several pages load anyhow comes in one file: many small ones are 4 kB more after compression, and as many requests.
+const together = [
+  { name: "shared", test: /preact|src.(app|live)\/|members.(row|log|refusal)|ui.control_line|values.(format|parse)/ },
+  { name: "panels", test: /src.(values.(draft|rows|units|paths|times)|panels.(panel|parts|draft_input))\./ },
+];
+
 export default defineConfig({
   base: "./",
   cacheDir: "node_modules/.vite",
@@ -25,6 +31,7 @@ export default defineConfig({
     modulePreload: { polyfill: false }, // every browser that runs the target below knows it
     target: "es2022",
     chunkSizeWarningLimit: 600, // three.js, which is loaded with the first 3-D panel
+    rolldownOptions: { output: { codeSplitting: { groups: together } } },
   },
   // Pre-bundling would move the module away from the `rrgate.wasm` that it finds by import.meta.url.
   optimizeDeps: { exclude: ["rrgate-client"] },

@@ -8,13 +8,12 @@ import { watchRoute } from "./app/router";
 import { AccessDesk } from "./gateway/access";
 import { AgentsDesk } from "./gateway/agents";
 import { DeviceList } from "./gateway/devices";
-import { RecordingDesk } from "./gateway/recordings";
 import { mustSignIn, session } from "./gateway/session";
 import { UsbDeviceList } from "./gateway/usb_devices";
 import "./styles/tokens.css";
 import "./styles/base.css";
 import "./styles/controls.css";
-import "./styles/devices.css";
+import "./styles/agents.css";
 import "./styles/members.css";
 
 const list = new DeviceList();
@@ -36,23 +35,11 @@ const access = new AccessDesk(session);
 access.start();
 const agents = new AgentsDesk(session);
 agents.start();
-const recordings = new RecordingDesk(session);
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
 const show = (): void =>
-  render(
-    <App
-      route={watchRoute()}
-      list={list}
-      usb={usb}
-      access={access}
-      agents={agents}
-      recordings={recordings}
-      session={session}
-    />,
-    place,
-  );
+  render(<App route={watchRoute()} list={list} usb={usb} access={access} agents={agents} session={session} />, place);
 loadLanguage().then(show, show); // in English, where the other texts cannot be had
 
 // For "install", and for the page that says that there is no gateway; browsers have it over HTTPS and on this machine.

@@ -63,15 +63,15 @@ test("the page comes compressed, with tags of its own, and in less than half of 
       expect([again.status, again.body.length]).toEqual([304, 0]);
     }
   }
-  expect(sizes.br).toBeLessThan(200_000);
+  expect(sizes.br).toBeLessThan(177_000);
   expect(sizes.br).toBeLessThan(sizes.identity * 0.4);
   expect(sizes.gzip).toBeLessThan(sizes.identity * 0.5);
 });
 
 const views = [
   // 23 kB of it are the plots.
-  { view: "?view=board", shows: '[data-panel="plot"] .freshness', never: /robot_page|scene_panel/, most: 225_000 },
-  { view: "?view=members", shows: '[data-member="Drive"]', never: /robot_page|board_page|_panel/, most: 180_000 },
+  { view: "?view=board", shows: '[data-panel="plot"] .freshness', never: /robot_page|scene_panel/, most: 200_000 },
+  { view: "?view=members", shows: '[data-member="Drive"]', never: /robot_page|board_page|_panel/, most: 164_000 },
 ];
 for (const { view, shows, never, most } of views)
   test(`${view} loads no part of another view, and less than ${most / 1000} kB`, async ({ page, lab }) => {
@@ -82,7 +82,7 @@ for (const { view, shows, never, most } of views)
     expect(size).toBeLessThan(most);
   });
 
-test("the list of devices comes without the pages of boards and robots, in less than 65 kB of files that are no WebAssembly", async ({
+test("the list of devices comes without the pages of boards and robots, in less than 60 kB of files that are no WebAssembly", async ({
   page,
   lab,
 }) => {
@@ -96,5 +96,5 @@ test("the list of devices comes without the pages of boards and robots, in less 
   expect([...files].filter((file) => /board_page|robot_page|panel/.test(file))).toEqual([]);
   let size = 0;
   for (const file of files) size += (await ask(file, { "accept-encoding": "br" })).body.length;
-  expect(size).toBeLessThan(65_000);
+  expect(size).toBeLessThan(60_000);
 });

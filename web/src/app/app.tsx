@@ -14,14 +14,14 @@ import type { DeviceList } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import type { AgentsDesk } from "../gateway/agents";
-import type { RecordingDesk } from "../gateway/recordings";
 import { isSignedOut, mustSignIn } from "../gateway/session";
 import type { Session, Who } from "../gateway/session";
-import { DevicesPage } from "../pages/devices_page";
+import type { DevicesPageProps } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
-import { RecordingsPage } from "../pages/recordings_page";
+import type { RecordingsProps } from "../pages/recordings_page";
 import { AgentsPart } from "../pages/agents_part";
 import { Account, SignInPage } from "../pages/sign_in_page";
+import { loaded } from "../ui/loaded";
 import { LanguageIcon, Mark, SunMoonIcon } from "../ui/icons";
 
 interface AppParts {
@@ -30,11 +30,10 @@ interface AppParts {
   usb: UsbDeviceList;
   access: AccessDesk;
   agents: AgentsDesk;
-  recordings: RecordingDesk;
   session: Session;
 }
 
-export function App({ route, list, usb, access, agents, recordings, session }: AppParts) {
+export function App({ route, list, usb, access, agents, session }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
   const who = useStore(session.who);
@@ -71,16 +70,7 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
       <main id="main" ref={main} tabIndex={-1}>
         {!isForm && <AgentsPart agents={agents} />}
         {(!isForm || onlyStop) && (
-          <Page
-            key={turn}
-            route={where}
-            list={list}
-            usb={usb}
-            access={access}
-            agents={agents}
-            recordings={recordings}
-            onlyStop={onlyStop}
-          />
+          <Page key={turn} route={where} list={list} usb={usb} access={access} agents={agents} onlyStop={onlyStop} />
         )}
         {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
       </main>
@@ -101,11 +91,14 @@ function useTurn(who: Who | null): number {
 
 type PageParts = Omit<AppParts, "route" | "session"> & { route: Route; onlyStop: boolean };
 
-function Page({ route: where, list, usb, access, agents, recordings, onlyStop }: PageParts) {
+const LoadedDevices = loaded<DevicesPageProps>(() => import("../pages/devices_page"));
+const LoadedRecordings = loaded<RecordingsProps>(() => import("../pages/recordings_page"));
+
+function Page({ route: where, list, usb, access, agents, onlyStop }: PageParts) {
   return (
     <>
-      {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} agents={agents} />}
-      {where.page === "recordings" && <RecordingsPage desk={recordings} list={list} />}
+      {where.page === "devices" && <LoadedDevices list={list} usb={usb} access={access} agents={agents} />}
+      {where.page === "recordings" && <LoadedRecordings list={list} />}
       {where.page === "service" && (
         <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} onlyStop={onlyStop} />
       )}

@@ -8,7 +8,12 @@ import { AccessAsk } from "../gateway/access_ask";
 import type { Session } from "../gateway/session";
 import { Failure } from "../ui/failure";
 
-export function AskPart({ session, use }: { session: Session; use: (token: string) => void }) {
+export interface AskPartProps {
+  session: Session;
+  use: (token: string) => void;
+}
+
+export default function AskPart({ session, use }: AskPartProps) {
   const ask = useMemo(() => new AccessAsk(session), [session]);
   useEffect(() => () => ask.dispose(), [ask]);
   const state = useStore(ask.state);

@@ -15,15 +15,16 @@ import { DeviceCard } from "./device_card";
 import { DeviceParts } from "./device_parts";
 import { StateBadge } from "../ui/state_badge";
 import { clockTime, ended, sentence, span } from "../ui/words";
+import "../styles/devices.css";
 
-interface DevicesPageParts {
+export interface DevicesPageProps {
   list: DeviceList;
   usb: UsbDeviceList;
   access: AccessDesk;
   agents: AgentsDesk;
 }
 
-export function DevicesPage({ list, usb, access, agents }: DevicesPageParts) {
+export default function DevicesPage({ list, usb, access, agents }: DevicesPageProps) {
   const state = useStore(list.state);
   const devices = devicesOf(state);
   return (

@@ -6,11 +6,23 @@ import { language, t } from "../app/language";
 import { useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { fileAddress, isUnderWay } from "../gateway/recordings";
-import type { Recording, RecordingDesk } from "../gateway/recordings";
+import { fileAddress, isUnderWay, RecordingDesk } from "../gateway/recordings";
+import type { Recording } from "../gateway/recordings";
+import { session } from "../gateway/session";
 import { isUsb } from "../gateway/usb_devices";
 import { Failure } from "../ui/failure";
 import { bytesText, sentence, span } from "../ui/words";
+import "../styles/devices.css";
+
+export interface RecordingsProps {
+  list: DeviceList;
+}
+
+const ownDesk = new RecordingDesk(session);
+
+export default function Recordings({ list }: RecordingsProps) {
+  return <RecordingsPage desk={ownDesk} list={list} />;
+}
 
 export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
   const state = useStore(desk.state);

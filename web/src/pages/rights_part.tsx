@@ -3,12 +3,12 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
-import { language, t } from "../app/language";
-import { askRights } from "../gateway/rights";
-import type { Rights } from "../gateway/rights";
+import { t } from "../app/language";
 import type { Who } from "../gateway/session";
-import { useAsked } from "../ui/use_asked";
-import { sentence } from "../ui/words";
+import { loaded } from "../ui/loaded";
+import type { RightsSheetProps } from "./rights_sheet";
+
+const LoadedSheet = loaded<RightsSheetProps>(() => import("./rights_sheet"));
 
 /** `children`: who one is. */
 export function RightsPart({ who, children }: { who: Who; children: ComponentChildren }) {
@@ -25,48 +25,9 @@ export function RightsPart({ who, children }: { who: Who; children: ComponentChi
       {open && (
         <div class="rights-sheet">
           <h2>{t("What you may do")}</h2>
-          <Shown who={who} />
+          <LoadedSheet who={who} />
         </div>
       )}
     </details>
   );
-}
-
-function Shown({ who }: { who: Who }) {
-  const { answer, failure } = useAsked(askRights, JSON.stringify(who));
-  if (failure !== null) return <p role="alert">{sentence(failure)}</p>;
-  if (!answer) return <p role="status">{t("Asking the gateway for them.")}</p>;
-  const { devices, gateway } = answer;
-  return (
-    <>
-      <p class="note">{proofText(answer)}</p>
-      {devices.length === 0 && <p>{t("You may use no device.")}</p>}
-      <dl>
-        {devices.map(({ device, all, some }) => (
-          <div key={device} data-rights={device}>
-            <dt>{device}</dt>
-            {all.length > 0 && <dd>{t("Everything: {0}", verbsText(all))}</dd>}
-            {some.length > 0 && <dd>{t("Some of it: {0}", verbsText(some))}</dd>}
-          </div>
-        ))}
-        {gateway.length > 0 && (
-          <div data-rights-gateway>
-            <dt>{t("The gateway")}</dt>
-            <dd>{verbsText(gateway)}</dd>
-          </div>
-        )}
-      </dl>
-    </>
-  );
-}
-
-/** As the configuration writes them: they are looked up there. */
-function verbsText(verbs: readonly string[]): string {
-  return verbs.join(", ");
-}
-
-function proofText({ proof, expiresAt }: Rights): string {
-  const shown = t("Known by: {0}.", proof);
-  if (expiresAt === null) return shown;
-  return `${shown} ${t("Good until {0}.", new Date(expiresAt).toLocaleString(language))}`;
 }

@@ -1,30 +1,28 @@
 // One service of one device: keeps it connected, and shows the robot's page where the object is a Create, else its members.
 // Layer: web/pages.
 
-import type { ComponentType } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { formatRoute, formatStep } from "../app/router";
-import type { PathStep, Route, View } from "../app/router";
+import type { Route, View } from "../app/router";
 import { recallBoard } from "../board/board";
 import { hasPreset, stopFor } from "../board/presets";
 import type { BoardPageProps } from "../board/board_page";
 import { StopButton, useSafe } from "../board/stop";
 import { useStore } from "../app/store";
-import { devicesOf, isShared } from "../gateway/devices";
+import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import { isUsb } from "../gateway/usb_devices";
-import { useObject, useWalk } from "../live/links";
-import { usePulse } from "../live/pulse";
+import { useObject } from "../live/links";
 import type { Link } from "../robot/link";
 import type { Remote } from "../robot/remote";
 import type { StopCall } from "../robot/stop";
 import { isCreate, isNamedCreate } from "../robot/is_create";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
-import { Silence } from "../ui/silence";
-import { ObjectView } from "./object_view";
+import { loaded } from "../ui/loaded";
+import type { MembersPageProps } from "./members_page";
 import { ReplayBar } from "./replay_bar";
 import type { RobotPageProps } from "./robot_page";
 
@@ -68,7 +66,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
         </div>
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
-      {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} list={list} />}
+      {link && shown === "members" && !onlyStop && <LoadedMembers link={link} route={route} path={path} list={list} />}
       {link && !onlyStop && <ReplayBar link={link} device={device} list={list} />}
       {link && !onlyStop && <Unreached link={link} />}
       {isMissing && (
@@ -165,20 +163,7 @@ function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): 
 
 const LoadedBoard = loaded<BoardPageProps>(() => import("../board/board_page"));
 const LoadedRobot = loaded<RobotPageProps>(() => import("./robot_page"));
-
-/** What is loaded once it is looked at. */
-function loaded<Props>(load: () => Promise<{ default: ComponentType<Props> }>): ComponentType<Props> {
-  return (props) => {
-    const [Shown, setShown] = useState<ComponentType<Props> | null>(null);
-    useEffect(() => {
-      load().then(
-        ({ default: shown }) => setShown(() => shown),
-        () => undefined, // the strip says that the gateway is away
-      );
-    }, []);
-    return Shown && <Shown {...props} />;
-  };
-}
+const LoadedMembers = loaded<MembersPageProps>(() => import("./members_page"));
 
 /** Whether the gateway knows no such device, and knew none since the page was opened: one that goes away stays shown. */
 function useMissing(device: string, list: DeviceList): boolean {
@@ -216,41 +201,4 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
     ?.find((d) => d.name === device)
     ?.services.find((s) => s.name === service);
   return isNamedCreate(known?.type ?? "");
-}
-
-interface MembersPageProps {
-  link: Link;
-  route: ServiceRoute;
-  path: readonly PathStep[];
-  list: DeviceList;
-}
-
-function MembersPage({ link, route, path, list }: MembersPageProps) {
-  const state = useStore(link.state);
-  const { object, last, failure } = useWalk(state, path);
-  const silent = usePulse(object, isShared(useStore(list.state), route.device));
-  if (failure !== null && state.kind === "online") {
-    return (
-      <p class="failure" role="alert">
-        {failure}
-      </p>
-    );
-  }
-  if (!last) {
-    if (state.kind === "lost") return null; // the strip above says why
-    return (
-      <div class="members-loading" aria-hidden="true">
-        <span class="bone" />
-        <span class="bone" />
-        <span class="bone" />
-      </div>
-    );
-  }
-  const key = `${JSON.stringify(path)}:${last.type}`;
-  return (
-    <>
-      <Silence silent={silent} />
-      <ObjectView key={key} object={last} live={object !== null} route={route} />
-    </>
-  );
 }

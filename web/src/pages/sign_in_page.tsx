@@ -6,8 +6,11 @@ import { t } from "../app/language";
 import { useStore } from "../app/store";
 import type { Session } from "../gateway/session";
 import { Failure } from "../ui/failure";
-import { AskPart } from "./ask_part";
+import { loaded } from "../ui/loaded";
+import type { AskPartProps } from "./ask_part";
 import { RightsPart } from "./rights_part";
+
+const LoadedAsk = loaded<AskPartProps>(() => import("./ask_part"));
 
 export function SignInPage({ session, done }: { session: Session; done: () => void }) {
   const [name, setName] = useState("");
@@ -78,7 +81,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
           {isBusy ? t("Signing in") : t("Sign in")}
         </button>
       </form>
-      {who?.requests && <AskPart session={session} use={(token) => void signIn("", token)} />}
+      {who?.requests && <LoadedAsk session={session} use={(token) => void signIn("", token)} />}
     </div>
   );
 }

@@ -6,11 +6,11 @@ import { t } from "../app/language";
 import { Refusal } from "../members/refusal";
 import { PATIENT, useAction } from "../members/row";
 import type { Member } from "../robot/remote";
+import { loaded } from "../ui/loaded";
 import { clockTime, flowing } from "../ui/words";
 import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
 import { rowsOf } from "../values/rows";
-import { asCode } from "./code";
-import type { CodeLanguage, Types } from "./code";
+import type { CodeProps } from "./code_part";
 import { DraftInput } from "./draft_input";
 import { fitDrafts } from "./form_drafts";
 import type { FormDrafts } from "./form_drafts";
@@ -18,6 +18,8 @@ import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 import "./form_panel.css";
+
+const LoadedCode = loaded<CodeProps>(() => import("./code_part"));
 
 /** One member by choice, or a row of them where the settings name several. */
 export default function FormPanel(props: PanelProps) {
@@ -213,55 +215,13 @@ function History({ done, take }: { done: readonly Done[]; take: (form: FormDraft
   );
 }
 
-const LANGUAGES: readonly CodeLanguage[] = ["JavaScript", "curl", "Python"];
-
-function Code({
-  member,
-  values,
-  place,
-  types,
-}: {
-  member: Member;
-  values: () => readonly unknown[];
-  place: PanelProps["place"];
-  types: Types;
-}) {
-  const [shown, setShown] = useState<{ language: CodeLanguage; text: string; isCopied: boolean } | null>(null);
-  const show = (language: CodeLanguage): void => {
-    let text: string;
-    try {
-      text = asCode(language, new URL(".", document.baseURI).href, place, member, values(), types);
-    } catch (error) {
-      return setShown({ language, text: (error as Error).message, isCopied: false });
-    }
-    setShown({ language, text, isCopied: false });
-    navigator.clipboard?.writeText(text).then(
-      () => setShown({ language, text, isCopied: true }),
-      () => undefined, // the text is there to be selected
-    );
-  };
+/** Loaded when it is opened for the first time. */
+function Code(props: CodeProps) {
+  const [wasOpen, setWasOpen] = useState(false);
   return (
-    <details>
+    <details onToggle={() => setWasOpen(true)}>
       <summary>{t("Copy as code")}</summary>
-      <div class="row-line">
-        {LANGUAGES.map((language) => (
-          <button
-            key={language}
-            class="button button-quiet"
-            type="button"
-            aria-pressed={shown?.language === language}
-            onClick={() => show(language)}
-          >
-            {language}
-          </button>
-        ))}
-        {shown?.isCopied && <span class="note">{t("copied")}</span>}
-      </div>
-      {shown && (
-        <pre class="json" tabIndex={0}>
-          {shown.text}
-        </pre>
-      )}
+      {wasOpen && <LoadedCode {...props} />}
     </details>
   );
 }
