@@ -38,7 +38,12 @@ export function pythonDriver(module: string, args: readonly string[]): Program {
 }
 
 function pythonRun(args: readonly string[]): Program {
-  const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
-  if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
-  return new Program(python, args);
+  return new Program(python(), args);
+}
+
+/** One that has Robot Raconteur. */
+export function python(): string {
+  const found = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
+  if (!existsSync(found)) throw new Error(`${found} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
+  return found;
 }
