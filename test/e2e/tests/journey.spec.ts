@@ -4,7 +4,9 @@ import { inEachEngine } from "../engines";
 import { GuardedLab, password } from "../guarded_lab";
 import { startNginx } from "../nginx";
 import type { Nginx } from "../nginx";
-import { webRoot } from "../processes";
+import { startPeer } from "../peers";
+import type { Peer } from "../peers";
+import { Lab, webRoot } from "../processes";
 import { button, field, link } from "../visitor";
 import type { Visitor } from "../visitor";
 
@@ -12,6 +14,9 @@ const phone = [412, 839] as const;
 
 let lab: GuardedLab;
 let nginx: Nginx;
+/** Without users, where the robot is commanded under a lease. */
+let demo: Lab;
+let hostile: Peer;
 
 test.beforeAll(async () => {
   lab = await GuardedLab.start(webRoot, {
@@ -20,9 +25,11 @@ test.beforeAll(async () => {
     more: { ["trusted_proxies"]: ["127.0.0.1"] },
   });
   nginx = await startNginx(Number(new URL(lab.url).port));
+  demo = await Lab.start();
+  hostile = await startPeer("test/e2e/peers/hostile.py", "hostile");
 });
 
-test.afterAll(() => Promise.all([nginx?.stop(), lab?.stop()]));
+test.afterAll(() => Promise.all([nginx?.stop(), lab?.stop(), demo?.stop(), hostile?.stop()]));
 
 async function signIn(visitor: Visitor): Promise<void> {
   await visitor.write(field("Name"), "root");
@@ -137,7 +144,72 @@ inEachEngine((at) => {
       expect(await visitor.complaints()).toEqual([]);
     }
   });
+
+  test("Stop is sent past a call that hangs, and its arrival is said", async () => {
+    const visitor = at();
+    await visitor.resize(1280, 800);
+    await visitor.open(`${demo.url}#/devices/create/Create?view=board`);
+    await visitor.see({ css: '[data-link="online"]' });
+    await visitor.choose({ css: '[data-panel="form"] select' }, "Drive");
+    await visitor.see(button("Call Drive"));
+    demo.create.signal("SIGSTOP"); // calls hang from here on
+    try {
+      await visitor.press(button("Call Drive"));
+      await visitor.press(button("Stop"));
+      await visitor.see({ css: '[data-stop="sent"]' });
+    } finally {
+      demo.create.signal("SIGCONT");
+    }
+    await visitor.see({ css: '[data-stop="arrived"]' }, /^arrived after \d+ ms/);
+    expect(await visitor.complaints()).toEqual([]);
+  });
+
+  test("a page that hangs, or is left, drives no more", async () => {
+    const visitor = at();
+    await visitor.resize(1280, 800);
+    const drive = async (): Promise<() => Promise<void>> => {
+      await visitor.open("about:blank"); // else the page stays, and what it has lost
+      await visitor.open(`${demo.url}#/devices/create/Create`);
+      await visitor.see({ css: '[data-link="online"]' });
+      await visitor.press(button("To start"));
+      await visitor.see({ css: '[data-pose="x"]' }, /^0\.000 m/);
+      await visitor.see(button("Forward"));
+      const letGo = await visitor.holdKey("ArrowUp");
+      await expect.poll(speed).toBeGreaterThan(0);
+      return letGo;
+    };
+    const letGo = await drive();
+    const hung = visitor.run(() => {
+      const until = Date.now() + 3_000;
+      while (Date.now() < until);
+    });
+    await expect.poll(speed, { intervals: [50], timeout: 2_500 }).toBe(0);
+    await hung;
+    await visitor.see({ css: '[data-control="lost"]' }, /has not renewed it/);
+    await letGo();
+    expect(await visitor.complaints()).toEqual([]);
+    await drive();
+    await visitor.open("about:blank");
+    await expect.poll(speed, { intervals: [50], timeout: 2_000 }).toBe(0);
+  });
+
+  test("names and texts of a hostile service are shown among all members, and nothing of them runs", async () => {
+    const visitor = at();
+    await visitor.open(`${hostile.url}#/devices/peer/hostile?view=members`);
+    await visitor.see({ css: '[data-member="then"]' }, /<img src=x/);
+    await visitor.see({ css: '[data-member="constructor"]' }, /<img src=x/);
+    await visitor.see({ css: '[data-member="toString"]' });
+    const found = () => [document.title, document.querySelectorAll("main :is(img, script)").length];
+    expect(await visitor.run(found)).toEqual(["peer · rrgate", 0]);
+    expect(await visitor.complaints()).toEqual([]);
+  });
 });
+
+/** Of the demo's robot, in m/s, by the gateway. */
+async function speed(): Promise<number> {
+  const state = (await (await fetch(`${demo.url}api/v1/devices/create/Create/state`)).json()) as { velocity: number };
+  return state.velocity;
+}
 
 /** By a program, straight ahead. */
 async function drive(velocity: number): Promise<Response> {
