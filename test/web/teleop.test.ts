@@ -5,6 +5,7 @@ import {
   deflectionOfGamepad,
   deflectionOfKeys,
   findGamepad,
+  partFor,
   readAxes,
   tell,
   together,
@@ -38,6 +39,12 @@ describe("teleop", () => {
       "right-y": -0.25,
     });
     expect(deflectionOfGamepad([Number.NaN])["left-x"]).toBe(0);
+  });
+  it("is at rest for a member whose sticks are, whatever others are pushed", () => {
+    const pushed = { ...AT_REST, "left-y": 0.5, "right-x": 1 };
+    expect(partFor([up], pushed)).toEqual({ ...AT_REST, "left-y": 0.5 });
+    expect(partFor([{ ...up, stick: "left-x" }], pushed)).toBe(AT_REST);
+    expect(partFor([], pushed)).toBe(AT_REST);
   });
   it("sets arguments by name, whole numbers rounded, beside the neutral ones", () => {
     const inputs = [

@@ -1,6 +1,7 @@
 // The teleop panel at the demo robot: what the robot was told is read at the robot.
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
+import { startTestService, webRoot } from "../processes";
 import type { Lab } from "../processes";
 import { addPanel } from "../board";
 
@@ -212,4 +213,48 @@ test("a gamepad whose axes the browser does not know is ignored, and the panel s
   await pushGamepad(page, 1, "");
   await page.waitForTimeout(300); // three repetitions of what is held
   expect(await speedOf(lab)).toBe(0);
+});
+
+test("one gamepad drives the members of several panels, each by axes of its own", async ({ page }) => {
+  const service = await startTestService(webRoot);
+  try {
+    const members = { p_double: { stick: "left-y", scale: 4 }, p_int32: { stick: "right-x", scale: -7 } } as const;
+    const panels = Object.entries(members).map(([member, axis], i) => ({
+      ...{ kind: "teleop", x: 6 * i, y: 0, w: 6, h: 12 },
+      settings: { member, axes: [{ ...axis, path: member, deadZone: 0.1 }], neutral: ["0"] },
+    }));
+    const packed = Buffer.from(JSON.stringify({ board: 1, panels })).toString("base64url");
+    await page.goto(`${service.url}#/devices/big/interop?view=board&board=${packed}`);
+    await expect(page.locator('[data-link="online"]')).toBeVisible();
+    const push = (axes: number[]) =>
+      page.evaluate((all) => {
+        Object.assign(window, { pads: [{ id: "Pad", connected: true, mapping: "standard", axes: all }] });
+      }, axes);
+    await push([0, 0, 0, 0]);
+    await expect(page.locator('[data-gamepad="true"]')).toHaveCount(2);
+    await page.locator('[data-panel="teleop"]').first().getByRole("button", { name: "Take control" }).click();
+    const values = () =>
+      Promise.all(
+        Object.keys(members).map(async (member) =>
+          (await page.request.get(`${service.url}api/v1/devices/big/interop/${member}`)).json(),
+        ),
+      );
+    await push([0, -1, 0, 0]);
+    await expect.poll(values).toEqual([4, 0]);
+    await push([0, -1, 1, 0]);
+    await expect.poll(values).toEqual([4, -7]);
+    await push([0, 0, 1, 0]);
+    await expect.poll(values).toEqual([0, -7]);
+    await page.request.put(`${service.url}api/v1/devices/big/interop/p_double`, { data: 1 }); // by somebody else
+    for (const [at, value] of [
+      [0, 0],
+      [-1, 7],
+      [0, 0],
+    ] as const) {
+      await push([0, 0, at, 0]);
+      await expect.poll(values).toEqual([1, value]);
+    }
+  } finally {
+    await service.stop();
+  }
 });

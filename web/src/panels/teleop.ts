@@ -120,6 +120,13 @@ export function readNeutral(
   });
 }
 
+/** The part of a deflection that these axes are about: other sticks are those of other members. */
+export function partFor(axes: readonly Axis[], deflection: Deflection): Deflection {
+  const part = { ...AT_REST };
+  for (const { stick } of axes) part[stick] = deflection[stick];
+  return STICKS.every((stick) => part[stick] === 0) ? AT_REST : part;
+}
+
 /** What `axis` is worth at a deflection: nothing in the dead zone, from there evenly to the scale. */
 export function worthOf(axis: Axis, deflection: Deflection): number {
   const given = deflection[axis.stick];

@@ -19,7 +19,18 @@ import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 import { StickPad } from "./stick";
 import type { StickMoves } from "./stick";
-import { AT_REST, commandOf, Commands, findGamepad, isStickKey, readAxes, readNeutral, STICKS, tell } from "./teleop";
+import {
+  AT_REST,
+  commandOf,
+  Commands,
+  findGamepad,
+  isStickKey,
+  partFor,
+  readAxes,
+  readNeutral,
+  STICKS,
+  tell,
+} from "./teleop";
 import type { Axis, Deflection } from "./teleop";
 import "../robot_view/pad.css";
 import "./teleop_panel.css";
@@ -72,6 +83,7 @@ export default function TeleopPanel(props: PanelProps) {
   const { shown, pad, sticks, stop, hasGamepad, ignored } = useSticks(
     driver,
     enabled,
+    mapping.axes,
     () => control?.mayCommand === true,
   );
   const setAxes = (axes: readonly Axis[]): void => change({ ...settings, axes });
@@ -157,19 +169,18 @@ function Sent({ mapping, inputs, definitions, scope, shown }: Shown) {
 }
 
 /** All that moves the sticks; in doubt they are at rest. */
-function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => boolean) {
+function useSticks(driver: Driver<Deflection>, enabled: boolean, axes: readonly Axis[], mayPoll: () => boolean) {
   const [shown, setShown] = useState<Deflection>(AT_REST);
   const [hasGamepad, setHasGamepad] = useState(false);
   const [ignored, setIgnored] = useState("");
-  const latest = useRef({ enabled, mayPoll });
-  latest.current = { enabled, mayPoll };
+  const latest = useRef({ enabled, axes, mayPoll });
+  latest.current = { enabled, axes, mayPoll };
   const actions = useMemo(() => {
     const held = new HeldSticks();
     const apply = (): void => {
-      const all = held.deflection;
-      const isRest = !latest.current.enabled || STICKS.every((stick) => all[stick] === 0);
-      driver.want(isRest ? AT_REST : all);
-      setShown(isRest ? AT_REST : all);
+      const now = latest.current.enabled ? partFor(latest.current.axes, held.deflection) : AT_REST;
+      driver.want(now);
+      setShown(now);
     };
     const letGo = (): void => {
       held.letGo();
@@ -196,10 +207,10 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
       if (held.releaseKey(event.code)) apply();
     };
     const poll = (): void => {
-      const { axes, ignored: other } = findGamepad(navigator.getGamepads?.() ?? []);
-      setHasGamepad(axes !== null);
+      const { axes: pushed, ignored: other } = findGamepad(navigator.getGamepads?.() ?? []);
+      setHasGamepad(pushed !== null);
       setIgnored(other);
-      if (held.poll(axes, latest.current.mayPoll() && document.hasFocus())) apply();
+      if (held.poll(pushed, latest.current.mayPoll() && document.hasFocus())) apply();
     };
     return {
       letGo,
