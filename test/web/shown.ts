@@ -5,8 +5,10 @@ import type { ComponentType } from "preact";
 import { Window } from "happy-dom";
 
 const window = new Window({ url: "http://gateway/" });
-const { document, HTMLElement, Event, KeyboardEvent, MouseEvent, PointerEvent } = window;
-Object.assign(globalThis, { window, document, HTMLElement, Event, KeyboardEvent, MouseEvent, PointerEvent });
+const { document, history, localStorage, HTMLElement, Event, EventTarget, KeyboardEvent, MouseEvent, PointerEvent } =
+  window;
+Object.assign(globalThis, { window, document, history, localStorage });
+Object.assign(globalThis, { HTMLElement, Event, EventTarget, KeyboardEvent, MouseEvent, PointerEvent });
 Object.assign(globalThis, {
   requestAnimationFrame: (draw: () => void) => setTimeout(draw),
   cancelAnimationFrame: clearTimeout,

@@ -12,6 +12,7 @@ import { useObject } from "../live/links";
 import { usePulse } from "../live/pulse";
 import { KINDS } from "../panels/panel";
 import type { Link } from "../robot/link";
+import type { Remote } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { saveFile } from "../ui/save_file";
 import { Silence } from "../ui/silence";
@@ -32,7 +33,8 @@ import { Guard } from "./guard";
 import { Keeper } from "./keeper";
 import { COLUMNS, findRoom, inOrder, MOST_COLUMNS, nudge, put, settle, spread } from "./layout";
 import { nameOf, PanelFrame } from "./panel_frame";
-import { presetFor } from "./presets";
+import { presetFor, stopFor } from "./presets";
+import type { Described } from "./presets";
 import { StopButton, useSafe } from "./stop";
 import { UndoBar, useUndo } from "./undo";
 import "./board.css";
@@ -53,16 +55,12 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
   const path = place.object;
   const key = boardKey(route);
   const { object, reach, last, failure } = useObject(link, "", path, list);
-  const preset = useMemo(() => {
-    if (!last) return null;
-    return presetFor({
-      type: last.type,
-      members: last.members,
-      definitions: new Definitions(last.definitions),
-      scope: scopeOf(last.type),
-      devices: devicesOf(list.state.value)?.map(({ name }) => name),
-    });
-  }, [last?.type]);
+  const described = useMemo(() => last && describe(last), [last]);
+  const preset = useMemo(
+    () => described && presetFor({ ...described, devices: devicesOf(list.state.value)?.map(({ name }) => name) }),
+    [described?.type], // once: its panels keep their ids, and with them what they show
+  );
+  const known = useMemo(() => described && stopFor(described), [described]); // the same type may have other members now
   const { board, isKept, trouble, setBoard: writeDown, setTrouble } = useBoard(key, route, preset);
   const undo = useUndo(`${key} ${route.board ?? ""}`);
   const grid = useRef<HTMLDivElement>(null);
@@ -81,7 +79,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       </div>
     );
   }
-  const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
+  const stop = known ?? board.stop; // a file may say how to stop what is not known, and nothing else
   if (onlyStop) {
     return (
       <div class="board-page">
@@ -159,6 +157,10 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       <UndoBar lost={undo.lost} undo={putBack} />
     </div>
   );
+}
+
+function describe({ type, members, definitions }: Remote): Described {
+  return { type, members, definitions: new Definitions(definitions), scope: scopeOf(type) };
 }
 
 function Waiting() {
