@@ -96,6 +96,8 @@ const german: Readonly<Record<string, string>> = {
   "NOT STOPPED: {0}": "NICHT GESTOPPT: {0}",
   "Name of {0}": "Name von {0}",
   "New items": "Neue Werte",
+  "No jogging before the robot has said how fast it may be.":
+    "Kein Tippen, bevor der Roboter gesagt hat, wie schnell er sein darf.",
   "No jogging on old values.": "Kein Tippen bei alten Werten.",
   "Not locked by this page.": "Nicht von dieser Seite gesperrt.",
   Notes: "Notizen",

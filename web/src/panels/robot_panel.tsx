@@ -18,8 +18,9 @@ import { JogRow } from "./jog_row";
 import { numberIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { Freshness } from "./parts";
+import { useRobotInfo } from "./robot_info";
 import { coordinateOf, isTurn, TOOL_AXES, toolsOf, velocityAlong } from "./tools";
-import type { Tool, ToolAxis } from "./tools";
+import type { ToolAxis } from "./tools";
 import "./robot_panel.css";
 
 const WIRE = "robot_state";
@@ -29,8 +30,9 @@ export default function RobotPanel(props: PanelProps) {
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
   const state = readState(look.value);
-  const [joints, setJoints] = useState<readonly Joint[]>([]);
-  const [tools, setTools] = useState<readonly Tool[]>([]);
+  const { info, failure: unknown } = useRobotInfo(object, isRobot);
+  const joints = useMemo(() => jointsOf(info), [info]);
+  const tools = useMemo(() => toolsOf(info), [info]);
   const [failure, setFailure] = useState<string | null>(null);
   const [halted, setHalted] = useState<string | null>(null);
   const acting = useAction();
@@ -38,19 +40,6 @@ export default function RobotPanel(props: PanelProps) {
   const changing = useMemo(() => new CommandMode(), []);
   useEffect(() => () => changing.leave(), [object, changing]);
   const percent = numberIn(settings, "percent", 10, 0, 100);
-  useEffect(() => {
-    if (!object || !isRobot) return;
-    let isCurrent = true;
-    object.get("robot_info").then(
-      (info) => {
-        if (!isCurrent) return;
-        setJoints(jointsOf(info));
-        setTools(toolsOf(info));
-      },
-      (error: unknown) => isCurrent && setFailure(explain(error)),
-    );
-    return () => void (isCurrent = false);
-  }, [object, isRobot]);
   if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
 
   const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
@@ -89,7 +78,7 @@ export default function RobotPanel(props: PanelProps) {
   const mayGoOn = (): boolean => control?.mayCommand !== false; // a hand that still holds a button takes nothing back
   const halt = (jog: Jog): Promise<unknown> =>
     reach ? stopNow(reach, false, () => jog("urgent", 0)) : Promise.resolve();
-  const canJog = object !== null && isOpen && mode === "jog" && look.stale === null;
+  const canJog = object !== null && isOpen && mode === "jog" && info !== undefined && look.stale === null;
   return (
     <div class="robot-panel panel-scroll">
       <ul class="robot-words" aria-label={t("State")}>
@@ -134,7 +123,7 @@ export default function RobotPanel(props: PanelProps) {
       <p class="note" role="status" hidden={halted === null || reach !== null}>
         {halted}
       </p>
-      <Failure text={failure ?? acting.failure} />
+      <Failure text={failure ?? acting.failure ?? unknown} />
       <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
         {Array.from(positions, (position, i) => {
           const joint = joints[i] ?? { name: t("Joint {0}", i + 1), unit: "", low: NaN, high: NaN, fastest: 1 };
@@ -192,7 +181,11 @@ export default function RobotPanel(props: PanelProps) {
         })}
       {!canJog && object && look.failure === null && (
         <p class="note">
-          {look.stale === null ? t("Choose Jog to move the robot by hand.") : t("No jogging on old values.")}
+          {look.stale !== null
+            ? t("No jogging on old values.")
+            : info === undefined
+              ? t("No jogging before the robot has said how fast it may be.")
+              : t("Choose Jog to move the robot by hand.")}
         </p>
       )}
       <Freshness look={look} isLive={object !== null} />

@@ -11,12 +11,12 @@ import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
 import { chainsOf, framesIn, posesOf } from "../values/frames";
-import type { Chain } from "../values/frames";
 import { pointsIn } from "../values/points";
 import { readState } from "./joints";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
+import { useRobotInfo } from "./robot_info";
 import { Picture } from "./scene";
 import "./scene_panel.css";
 
@@ -27,20 +27,12 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
   const usual = choices.find(({ name }) => name === "robot_state") ?? choices[0];
   const name = textIn(settings, "member") || usual?.name || "";
   const look = useFeed(object, feedKindOf(choices.find((each) => each.name === name)), name);
-  const [chains, setChains] = useState<readonly Chain[]>([]);
+  const { info, failure: unknown } = useRobotInfo(object, object?.has("robot_info", "property") === true);
+  const chains = useMemo(() => chainsOf(info), [info]);
   const [failure, setFailure] = useState<string | null>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const picture = useRef<Picture | null>(null);
 
-  useEffect(() => {
-    if (!object?.has("robot_info", "property")) return;
-    let isOver = false;
-    object.get("robot_info").then(
-      (info) => !isOver && setChains(chainsOf(info)),
-      (error: unknown) => !isOver && setFailure(explain(error)),
-    );
-    return () => void (isOver = true);
-  }, [object]);
   useEffect(() => {
     const element = canvas.current;
     if (!element) return;
@@ -97,7 +89,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
           {t("From the side")}
         </button>
       </div>
-      <Failure text={failure} />
+      <Failure text={failure ?? unknown} />
       <canvas
         ref={canvas}
         class={`scene ${look.stale === null ? "" : "is-stale"}`}

@@ -7,17 +7,16 @@ import { useStore } from "../app/store";
 import { useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
 import { onStop } from "../robot/control";
-import { explain } from "../robot/remote";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { enumName } from "../values/definitions";
 import { CommandMode } from "./command_mode";
 import { GeneratorRun } from "./generator_run";
 import { jointsOf, readState } from "./joints";
-import type { Joint } from "./joints";
 import { NumberField } from "./number_field";
 import type { PanelProps } from "./panel";
 import { Freshness } from "./parts";
+import { useRobotInfo } from "./robot_info";
 import { MOST_WAYPOINTS, trajectoryThrough, waypointsIn } from "./waypoints";
 import type { Waypoint } from "./waypoints";
 import "./trajectory_panel.css";
@@ -32,7 +31,8 @@ export default function TrajectoryPanel(props: PanelProps) {
   const canRun = has(WIRE) && has("execute_trajectory");
   const look = useFeed(object, canRun ? "wire" : null, WIRE);
   const advanced = useFeed(object, canRun && has(PROGRESS) ? "wire" : null, PROGRESS);
-  const [joints, setJoints] = useState<readonly Joint[]>([]);
+  const { info, failure: unknown } = useRobotInfo(object, canRun);
+  const joints = useMemo(() => jointsOf(info), [info]);
   const [said, setSaid] = useState<string | null>(null);
   const beginning = useAction();
   const { control, last, isOpen } = useControl(object);
@@ -48,15 +48,6 @@ export default function TrajectoryPanel(props: PanelProps) {
     [object, mode, run],
   );
   useEffect(() => onStop(() => void run.stop()), [run]);
-  useEffect(() => {
-    if (!object || !canRun) return;
-    let isCurrent = true;
-    object.get("robot_info").then(
-      (info) => isCurrent && setJoints(jointsOf(info)),
-      (error: unknown) => isCurrent && setSaid(explain(error)),
-    );
-    return () => void (isCurrent = false);
-  }, [object, canRun]);
   const positions = readState(look.value)?.positions ?? new Float64Array();
   const here = useRef(positions);
   here.current = positions;
@@ -99,7 +90,7 @@ export default function TrajectoryPanel(props: PanelProps) {
           {running === "stopping" ? t("stopping: the device answers the step under way first") : t(running)}
         </span>
       </div>
-      <Failure text={beginning.failure ?? failure ?? said} />
+      <Failure text={beginning.failure ?? failure ?? said ?? unknown} />
       <div class="panel-scroll">
         <table class="waypoints" aria-label={t("Waypoints")}>
           <thead>

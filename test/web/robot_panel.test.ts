@@ -1,0 +1,101 @@
+// Panels of a standard robot over outages: nothing of the robot before is taken for that of the one that there is now.
+import { button, clear, find, show, text } from "./shown";
+import { memberOf } from "./members";
+import type { PanelProps } from "../../web/src/panels/panel";
+import RobotPanel from "../../web/src/panels/robot_panel";
+import TrajectoryPanel from "../../web/src/panels/trajectory_panel";
+import { OwnLocks } from "../../web/src/robot/own_locks";
+import type { Remote } from "../../web/src/robot/remote";
+import { UnderWay } from "../../web/src/robot/under_way";
+import { Definitions } from "../../web/src/values/definitions";
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => {
+  clear();
+  vi.useRealTimers();
+});
+
+const SCOPE = "com.robotraconteur.robotics.robot";
+const DEFINITIONS = new Definitions([`service ${SCOPE}\nenum RobotCommandMode\nhalt = 0,\njog = 1\nend\n`]);
+const PERIOD_MS = 100;
+const JOINT = {
+  joint_identifier: { name: "shoulder" },
+  joint_limits: { lower: -1, upper: 1, velocity: 2, reduced_velocity: 0.5 },
+  default_units: 2,
+};
+const INFO = { joint_info: [JOINT] };
+
+/** A robot that is in jog mode, and says so regularly. */
+const robotOf = (info: () => Promise<unknown>) =>
+  ({
+    path: "Robot",
+    controls: new Map(),
+    locks: new OwnLocks(),
+    underWay: new UnderWay(),
+    get: vi.fn(info),
+    async *wire(_: string, signal: AbortSignal) {
+      while (!signal.aborted) {
+        yield { command_mode: 1, operational_mode: 0, controller_state: 0, joint_position: new Float64Array([0.25]) };
+        await new Promise((resolve) => setTimeout(resolve, PERIOD_MS));
+      }
+    },
+  }) as unknown as Remote;
+
+const members = [
+  memberOf("wire", "RobotState", "robot_state"),
+  memberOf("function", "void", "jog_joint"),
+  memberOf("function", "TrajectoryStatus{generator}", "execute_trajectory"),
+];
+
+async function showPanel(panel: typeof RobotPanel, object: Remote) {
+  const update = show(panel, {
+    object,
+    reach: object,
+    members,
+    definitions: DEFINITIONS,
+    scope: SCOPE,
+    place: { device: "usb:d", service: "s", object: "" },
+    settings: { waypoints: [{ seconds: 2, positions: [0.5] }] },
+    change: () => undefined,
+  } as unknown as PanelProps);
+  await vi.advanceTimersByTimeAsync(1_000);
+  return async (next: Remote | null): Promise<void> => {
+    void update({ object: next, reach: next });
+    await vi.advanceTimersByTimeAsync(900);
+  };
+}
+
+const jogForward = () => find<HTMLButtonElement>(".jog-button[aria-label$=forward]");
+
+describe("limits", () => {
+  const silent = () => robotOf(() => Promise.reject(new Error("not yet")));
+  const known = () => robotOf(() => Promise.resolve(INFO));
+
+  test("of the robot before are not jogged by", async () => {
+    const reconnect = await showPanel(RobotPanel, known());
+    expect(text()).toContain("shoulder");
+    expect(jogForward().disabled).toBe(false);
+    await reconnect(null);
+    expect(text()).toContain("shoulder"); // what was known, marked as old
+    await reconnect(silent());
+    expect(text()).toContain("not yet");
+    expect([jogForward().disabled, text().includes("shoulder")]).toEqual([true, false]);
+  });
+
+  test("of the robot before check no trajectory", async () => {
+    const reconnect = await showPanel(TrajectoryPanel, known());
+    expect(button("Run").disabled).toBe(false);
+    await reconnect(null);
+    await reconnect(silent());
+    expect(text()).toContain("not yet");
+    expect([button("Run").disabled, text().includes("shoulder")]).toEqual([true, false]);
+  });
+
+  test("that could not be read are asked for again", async () => {
+    const info = vi.fn(() => Promise.resolve<unknown>(INFO)).mockRejectedValueOnce(new Error("not yet"));
+    await showPanel(RobotPanel, robotOf(info));
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(info).toHaveBeenCalledTimes(2);
+    expect([jogForward().disabled, text().includes("not yet")]).toEqual([false, false]);
+  });
+});
