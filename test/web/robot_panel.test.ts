@@ -25,8 +25,8 @@ const JOINT = {
 };
 const INFO = { joint_info: [JOINT] };
 
-/** A robot that is in jog mode, and says so regularly. */
-const robotOf = (info: () => Promise<unknown>) =>
+/** A robot that is in jog mode, and says so regularly, so many times. */
+const robotOf = (info: () => Promise<unknown>, times = Infinity) =>
   ({
     path: "Robot",
     controls: new Map(),
@@ -34,7 +34,8 @@ const robotOf = (info: () => Promise<unknown>) =>
     underWay: new UnderWay(),
     get: vi.fn(info),
     async *wire(_: string, signal: AbortSignal) {
-      while (!signal.aborted) {
+      for (let said = 0; !signal.aborted; ++said) {
+        if (said === times) await new Promise(() => undefined);
         yield { command_mode: 1, operational_mode: 0, controller_state: 0, joint_position: new Float64Array([0.25]) };
         await new Promise((resolve) => setTimeout(resolve, PERIOD_MS));
       }
@@ -97,5 +98,39 @@ describe("limits", () => {
     await vi.advanceTimersByTimeAsync(1_000);
     expect(info).toHaveBeenCalledTimes(2);
     expect([jogForward().disabled, text().includes("not yet")]).toEqual([false, false]);
+  });
+});
+
+describe("what a robot said before an outage", () => {
+  const known = () => robotOf(() => Promise.resolve(INFO));
+  const pressed = () => ["Halt", "Jog"].filter((name) => button(name).getAttribute("aria-pressed") === "true");
+
+  test("is marked as old, and no mode is shown as chosen", async () => {
+    const reconnect = await showPanel(RobotPanel, known());
+    const isMarked = () => [".robot-words", ".joints"].map((each) => find(each).classList.contains("is-stale"));
+    expect([pressed(), isMarked()]).toEqual([["Jog"], [false, false]]);
+    await reconnect(null);
+    expect([pressed(), isMarked()]).toEqual([[], [true, true]]);
+    await reconnect(known());
+    expect([pressed(), isMarked()]).toEqual([["Jog"], [false, false]]);
+  });
+
+  test("is no place for a waypoint", async () => {
+    const reconnect = await showPanel(TrajectoryPanel, known());
+    const isOff = () => ["Here 1", "Add where the robot is"].map((name) => button(name).disabled);
+    expect(isOff()).toEqual([false, false]);
+    await reconnect(null);
+    expect(isOff()).toEqual([true, true]);
+    await reconnect(known());
+    expect(isOff()).toEqual([false, false]);
+  });
+
+  test("is no place for a waypoint where it says nothing any more", async () => {
+    await showPanel(
+      TrajectoryPanel,
+      robotOf(() => Promise.resolve(INFO), 5),
+    );
+    expect(text()).toContain("Stale");
+    expect(button("Here 1").disabled).toBe(true);
   });
 });

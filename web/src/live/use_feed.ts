@@ -88,6 +88,11 @@ export function lookAt(feed: Feed, isLive: boolean, now: number): Look {
   };
 }
 
+/** Whether what `look` says is what the device has now: to be acted on. `object`: that which is connected. */
+export function isFresh({ feed, stale, failure }: Look, object: Remote | null): boolean {
+  return object !== null && feed?.object === object && stale === null && failure === null;
+}
+
 /** `0.4 s`, `12 s`, `3 min`. */
 export function oldness(ms: number): string {
   return ms < 9950 ? `${(ms / 1000).toFixed(1)} s` : span(ms);

@@ -3,7 +3,7 @@
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { useFeed } from "../live/use_feed";
+import { isFresh, useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
 import { stopNow, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
@@ -42,6 +42,8 @@ export default function RobotPanel(props: PanelProps) {
   const percent = numberIn(settings, "percent", 10, 0, 100);
   if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
 
+  const isNow = isFresh(look, object);
+  const age = look.stale === null ? "" : "is-stale";
   const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
   const beginJog = (): void => acting.run(async () => void (object && (await changing.change(object, control, 1))));
   const haltAll = (): void => {
@@ -78,10 +80,10 @@ export default function RobotPanel(props: PanelProps) {
   const mayGoOn = (): boolean => control?.mayCommand !== false; // a hand that still holds a button takes nothing back
   const halt = (jog: Jog): Promise<unknown> =>
     reach ? stopNow(reach, false, () => jog("urgent", 0)) : Promise.resolve();
-  const canJog = object !== null && isOpen && mode === "jog" && info !== undefined && look.stale === null;
+  const canJog = isNow && isOpen && mode === "jog" && info !== undefined;
   return (
     <div class="robot-panel panel-scroll">
-      <ul class="robot-words" aria-label={t("State")}>
+      <ul class={`robot-words ${age}`} aria-label={t("State")}>
         {stateWords(state, definitions, scope).map(({ text, kind }) => (
           <li key={text} class={`word-${kind}`}>
             {text}
@@ -92,7 +94,7 @@ export default function RobotPanel(props: PanelProps) {
         <button
           class="button"
           type="button"
-          aria-pressed={mode === "halt"}
+          aria-pressed={isNow && mode === "halt"}
           onPointerDown={(event) => event.button === 0 && haltAll()}
           onClick={(event) => event.detail === 0 && haltAll()}
         >
@@ -101,7 +103,7 @@ export default function RobotPanel(props: PanelProps) {
         <button
           class="button"
           type="button"
-          aria-pressed={mode === "jog"}
+          aria-pressed={isNow && mode === "jog"}
           disabled={!object || acting.busy || look.failure !== null}
           onClick={beginJog}
         >
@@ -124,7 +126,7 @@ export default function RobotPanel(props: PanelProps) {
         {halted}
       </p>
       <Failure text={failure ?? acting.failure ?? unknown} />
-      <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
+      <ol class={`joints ${age}`}>
         {Array.from(positions, (position, i) => {
           const joint = joints[i] ?? { name: t("Joint {0}", i + 1), unit: "", low: NaN, high: NaN, fastest: 1 };
           const jog: Jog = (way, speed) => jogJoint(way, i, speed);
@@ -152,7 +154,7 @@ export default function RobotPanel(props: PanelProps) {
           const pose = state?.tools[chain];
           return (
             pose && (
-              <section key={chain} class={`tool-axes ${look.stale === null ? "" : "is-stale"}`} data-tool={tool.name}>
+              <section key={chain} class={`tool-axes ${age}`} data-tool={tool.name}>
                 <h3>{t("Tool of {0}", tool.name)}</h3>
                 <ul>
                   {TOOL_AXES.map((axis) => {

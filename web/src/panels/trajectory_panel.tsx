@@ -4,7 +4,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
-import { useFeed } from "../live/use_feed";
+import { isFresh, useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
 import { onStop } from "../robot/control";
 import { ControlLine, useControl } from "../ui/control_line";
@@ -74,7 +74,8 @@ export default function TrajectoryPanel(props: PanelProps) {
       );
     });
   const isUnderWay = running === "running" || running === "stopping" || beginning.busy;
-  const canBegin = object !== null && isKnown && isOpen && look.stale === null && look.failure === null && !isUnderWay;
+  const isHere = isFresh(look, object) && isKnown && positions.length > 0; // else nobody knows where the robot is
+  const canBegin = isHere && isOpen && !isUnderWay;
   return (
     <div class="trajectory-panel">
       <ControlLine control={last} isThere={object !== null} place={place} />
@@ -129,7 +130,7 @@ export default function TrajectoryPanel(props: PanelProps) {
                   <button
                     class="button button-quiet"
                     type="button"
-                    disabled={!isKnown || positions.length === 0}
+                    disabled={!isHere}
                     onClick={() => edit(at, { positions: [...where(), ...there.slice(joints.length)] })}
                   >
                     {t("Here")}
@@ -155,7 +156,7 @@ export default function TrajectoryPanel(props: PanelProps) {
         <button
           class="button"
           type="button"
-          disabled={positions.length === 0 || joints.length === 0 || waypoints.length >= MOST_WAYPOINTS}
+          disabled={!isHere || waypoints.length >= MOST_WAYPOINTS}
           onClick={() =>
             set([...waypoints, { seconds: (waypoints.at(-1)?.seconds ?? 0) + NEXT_SECONDS, positions: where() }])
           }
