@@ -37,7 +37,7 @@ export function useFeed(object: Remote | null, kind: FeedKind | null, member: st
     const timer = setInterval(() => {
       const feed = last.current;
       if (!feed || feed.member !== member) return;
-      const next = lookAt(feed, object !== null, performance.now());
+      const next = lookAt(feed, feed.object === object, performance.now());
       setLook((old) =>
         old.feed === next.feed &&
         old.value === next.value &&
@@ -75,7 +75,7 @@ export function useEach(object: Remote | null, kind: FeedKind | null, member: st
   return feed;
 }
 
-/** `isLive`: whether there is a connection; without one, everything is old. */
+/** `isLive`: whether it is of the object that there is now; what another said is old. */
 export function lookAt(feed: Feed, isLive: boolean, now: number): Look {
   const age = feed.pace.ageMs(now);
   const isStale = age !== null && (feed.pace.isStale(now) || (!isLive && age > 250));
