@@ -5,13 +5,15 @@ import {
   deflectionOfGamepad,
   deflectionOfKeys,
   findGamepad,
+  neutralTexts,
   partFor,
   readAxes,
+  readNeutral,
   tell,
   together,
   worthOf,
 } from "../../web/src/panels/teleop";
-import type { Axis } from "../../web/src/panels/teleop";
+import type { Axis, Input } from "../../web/src/panels/teleop";
 import { HeldSticks } from "../../web/src/panels/held_sticks";
 import { numberIn } from "../../web/src/panels/panel";
 import { Definitions } from "../../web/src/values/definitions";
@@ -85,6 +87,21 @@ describe("teleop", () => {
 });
 
 describe("at rest", () => {
+  it("each parameter is told its own neutral value, wherever it stands", () => {
+    const [speed, radius] = [
+      { name: "speed", type: "double" },
+      { name: "radius", type: "double" },
+    ] as const;
+    const settings = {
+      neutral: neutralTexts(readNeutral({ neutral: ["0", "1000"] }, [speed, radius], nothing, ""), [speed, radius]),
+    };
+    const rest = (inputs: readonly Input[]) =>
+      commandOf({ axes: [], neutral: readNeutral(settings, inputs, nothing, "") }, inputs, AT_REST, nothing, "");
+    expect(rest([speed, radius])).toEqual([0, 1000]);
+    expect(rest([radius, speed])).toEqual([1000, 0]);
+    expect(rest([{ name: "toString", type: "double" }])).toEqual([0]);
+  });
+
   const inputs = [{ name: "velocity", type: "double" }];
   const mapping = (path: string, text: string) => ({
     axes: [{ ...up, path }],

@@ -195,7 +195,7 @@ const STANDARD: Readonly<Record<string, Preset>> = {
             { stick: "right-y", path: "speed", scale: 0.8 },
             { stick: "right-x", path: "turn", scale: -1 },
           ],
-          neutral: ["0", "0"],
+          neutral: { speed: "0", turn: "0" },
         },
       ],
       ["image", 4, 0, 5, 11, { member: "frame_stream_compressed" }, "Head", "baxter/head_camera"],

@@ -8,14 +8,13 @@ import { Refusal } from "../members/refusal";
 import { onStop } from "../robot/control";
 import type { Member } from "../robot/remote";
 import { clockTimeMs } from "../ui/words";
-import { makeDraft, valueOf } from "../values/draft";
-import type { Draft } from "../values/draft";
 import { rowsOf } from "../values/rows";
 import { DraftInput } from "./draft_input";
 import { GeneratorRun } from "./generator_run";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
+import { useDrafts } from "./use_drafts";
 
 interface Result {
   number: number;
@@ -45,45 +44,37 @@ export default function GeneratorPanel(props: PanelProps) {
 }
 
 function Run({ object, definitions, scope, place, member }: PanelProps & { member: Member }) {
-  const plain = member.parameters.filter(({ type }) => !type.endsWith("{generator}"));
-  const stepped = member.parameters.find(({ type }) => type.endsWith("{generator}"));
-  const stepType = stepped?.type.replace(/\{generator\}$/, "") ?? "";
-  const [drafts, setDrafts] = useState(() => plain.map(({ type }) => makeDraft(type, definitions, scope)));
-  const [step, setStep] = useState(() => (stepped ? makeDraft(stepType, definitions, scope) : null));
+  const inputs = useMemo(() => member.parameters.map(inputOf), [member]);
+  const { fields, lost } = useDrafts(inputs, definitions, scope);
   const [results, setResults] = useState<readonly Result[]>([]);
-  const latest = useRef({ definitions, scope });
-  latest.current = { definitions, scope };
+  const latest = useRef({ type: member.type, definitions, scope });
+  latest.current = { type: member.type, definitions, scope };
   const run = useMemo(
     () =>
       new GeneratorRun((value) => {
-        const text = rowsOf(
-          value,
-          member.type.replace(/\{generator\}$/, ""),
-          latest.current.definitions,
-          latest.current.scope,
-        )
+        const { type, definitions, scope } = latest.current;
+        const text = rowsOf(value, type.replace(GENERATOR, ""), definitions, scope)
           .map((row) => (row.name === "" ? row.text : `${row.name}: ${row.text}`))
           .join(", ");
         setResults((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MOST - 1)]);
       }),
-    [member],
+    [], // also over a connection that is made anew: it says what became of the run before
   );
   const state = useStore(run.state);
   const failure = useStore(run.failure);
   useEffect(() => () => run.leave(), [object, run]);
   useEffect(() => onStop(() => void run.stop()), [run]);
 
-  const read = (draft: Draft | undefined, type: string): unknown =>
-    valueOf(draft ?? makeDraft(type, definitions, scope), type, definitions, scope);
   const begin = (): AsyncGenerator<unknown, void, unknown> => {
     if (!object) throw new Error(t("not connected"));
+    const args = fields.filter(({ isStep }) => !isStep);
     return object.generate(
       member.name,
-      plain.map(({ type }, i) => read(drafts[i], type)),
+      args.map(({ value }) => value()),
     );
   };
   const given = useRef((): unknown => undefined);
-  given.current = () => (step === null ? undefined : read(step, stepType)); // what is typed in while it runs counts
+  given.current = () => fields.find(({ isStep }) => isStep)?.value(); // what is typed in while it runs counts
   const go = (byItself: boolean): void => {
     if (run.isFresh) setResults([]);
     void run.go(byItself, begin, () => given.current());
@@ -92,27 +83,13 @@ function Run({ object, definitions, scope, place, member }: PanelProps & { membe
   const canStop = state === "running" || state === "stepping" || state === "held";
   return (
     <div class="member-form">
-      {plain.map(({ name, type }, i) => (
+      {fields.map(({ name, type, isStep, draft, change }) => (
         <DraftInput
           key={name}
-          label={name}
-          type={type}
-          definitions={definitions}
-          scope={scope}
-          draft={drafts[i] ?? makeDraft(type, definitions, scope)}
-          change={(next) => setDrafts(drafts.map((old, at) => (at === i ? next : old)))}
+          label={isStep ? `${name}, ${t("each step")}` : name}
+          {...{ type, definitions, scope, draft, change }}
         />
       ))}
-      {stepped && step && (
-        <DraftInput
-          label={`${stepped.name}, ${t("each step")}`}
-          type={stepType}
-          definitions={definitions}
-          scope={scope}
-          draft={step}
-          change={setStep}
-        />
-      )}
       <div class="row-line">
         <button class="button" type="button" disabled={!object || isUnderWay} onClick={() => go(true)}>
           {t("Run")}
@@ -127,7 +104,7 @@ function Run({ object, definitions, scope, place, member }: PanelProps & { membe
           {state === "stopping" ? t("stopping: the device answers the step under way first") : t(state)}
         </span>
       </div>
-      <Refusal failure={failure} isLocked={run.isLocked} object={object} place={place} />
+      <Refusal failure={failure ?? lost} isLocked={run.isLocked} object={object} place={place} />
       <ol class="log" tabIndex={0} aria-label={t("Results of {0}", member.name)}>
         {results.map(({ number, time, text }) => (
           <li key={number}>
@@ -139,4 +116,11 @@ function Run({ object, definitions, scope, place, member }: PanelProps & { membe
       </ol>
     </div>
   );
+}
+
+const GENERATOR = /\{generator\}$/;
+
+/** `isStep`: it is given with each step, not when the run begins. */
+function inputOf({ name, type }: Member["parameters"][number]): { name: string; type: string; isStep: boolean } {
+  return { name, type: type.replace(GENERATOR, ""), isStep: GENERATOR.test(type) };
 }

@@ -7,13 +7,13 @@ import { useEach, useFeed } from "../live/use_feed";
 import { Refusal } from "../members/refusal";
 import { useAction } from "../members/row";
 import { clockTimeMs } from "../ui/words";
-import { makeDraft, valueOf } from "../values/draft";
 import { formatValue } from "../values/format";
 import { DraftInput } from "./draft_input";
 import { Outlet } from "./outlet";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { Freshness, MemberSelect } from "./parts";
+import { useDrafts } from "./use_drafts";
 
 const MOST = 100;
 const SHOW_MS = 100;
@@ -76,7 +76,8 @@ function Packets({ object, name }: { object: PanelProps["object"]; name: string 
 }
 
 function SendForm({ object, definitions, scope, place, name, type }: PanelProps & { name: string; type: string }) {
-  const [draft, setDraft] = useState(() => makeDraft(type, definitions, scope));
+  const inputs = useMemo(() => [{ name, type }], [name, type]);
+  const { fields, lost } = useDrafts(inputs, definitions, scope);
   const [sent, setSent] = useState(0);
   const outlet = useMemo(() => (object ? new Outlet(() => object.openPipe(name)) : null), [object, name]);
   const sending = useAction();
@@ -85,13 +86,15 @@ function SendForm({ object, definitions, scope, place, name, type }: PanelProps 
     event.preventDefault();
     sending.run(async () => {
       if (!outlet) throw new Error(t("not connected"));
-      await outlet.send(valueOf(draft, type, definitions, scope));
+      await outlet.send(fields[0]?.value());
       setSent((count) => count + 1);
     });
   };
   return (
     <form class="member-form" onSubmit={send}>
-      <DraftInput label={name} type={type} definitions={definitions} scope={scope} draft={draft} change={setDraft} />
+      {fields.map(({ draft, change }) => (
+        <DraftInput key={name} label={name} {...{ type, definitions, scope, draft, change }} />
+      ))}
       <div class="row-line">
         <button class="button" type="submit" disabled={!object || sending.busy}>
           {t("Send")}
@@ -99,7 +102,7 @@ function SendForm({ object, definitions, scope, place, name, type }: PanelProps 
         </button>
         {sent > 0 && <output class="note">{t("{0} sent", sent)}</output>}
       </div>
-      <Refusal failure={sending.failure} isLocked={sending.isLocked} object={object} place={place} />
+      <Refusal failure={sending.failure ?? lost} isLocked={sending.isLocked} object={object} place={place} />
     </form>
   );
 }

@@ -104,7 +104,7 @@ export function readAxes(settings: Settings): Axis[] {
   });
 }
 
-/** The texts of the neutral value; what the settings don't have is empty. */
+/** The texts of the neutral value, by the names of the parameters; what the settings don't have is empty. */
 export function readNeutral(
   settings: Settings,
   inputs: readonly Input[],
@@ -112,12 +112,21 @@ export function readNeutral(
   scope: string,
 ): Draft[] {
   const given = Object.hasOwn(settings, "neutral") ? settings["neutral"] : undefined;
-  const texts: readonly unknown[] = Array.isArray(given) ? given : [];
-  return inputs.map(({ type }, i) => {
+  return inputs.map(({ name, type }, i) => {
     const empty = makeDraft(type, definitions, scope);
-    const text = texts[i];
+    const text = child(given, Array.isArray(given) ? i : name); // an older board has a list, in the order that they had
     return empty.kind === "text" && typeof text === "string" ? { kind: "text", text } : empty;
   });
+}
+
+/** As it is kept in the settings. */
+export function neutralTexts(neutral: readonly Draft[], inputs: readonly Input[]): Record<string, string> {
+  return Object.fromEntries(
+    inputs.flatMap(({ name }, i) => {
+      const draft = neutral[i];
+      return draft?.kind === "text" ? [[name, draft.text]] : [];
+    }),
+  );
 }
 
 /** The part of a deflection that these axes are about: other sticks are those of other members. */

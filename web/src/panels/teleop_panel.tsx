@@ -25,6 +25,7 @@ import {
   Commands,
   findGamepad,
   isStickKey,
+  neutralTexts,
   partFor,
   readAxes,
   readNeutral,
@@ -130,15 +131,10 @@ export default function TeleopPanel(props: PanelProps) {
               definitions={definitions}
               scope={scope}
               draft={draft}
-              change={(next) =>
-                change({
-                  ...settings,
-                  neutral: mapping.neutral.map((each, at) => {
-                    const chosen = at === i ? next : each;
-                    return chosen.kind === "text" ? chosen.text : null;
-                  }),
-                })
-              }
+              change={(next) => {
+                const neutral = mapping.neutral.map((each, at) => (at === i ? next : each));
+                change({ ...settings, neutral: neutralTexts(neutral, inputs) });
+              }}
             />
           );
         })}
