@@ -1,6 +1,8 @@
 // The board of an object over outages of its device.
-import { clear, find, press, settle, show, text } from "./shown";
+import { button, clear, enter, find, press, settle, show, text } from "./shown";
 import { memberOf } from "./members";
+import { MOST_PANELS, packBoard, recallBoard } from "../../web/src/board/board";
+import type { Panel } from "../../web/src/board/board";
 import { Store } from "../../web/src/app/store";
 import BoardPage from "../../web/src/board/board_page";
 import type { BoardPageProps } from "../../web/src/board/board_page";
@@ -9,6 +11,9 @@ import { OwnLocks } from "../../web/src/robot/own_locks";
 import type { Member, Remote } from "../../web/src/robot/remote";
 import { UnderWay } from "../../web/src/robot/under_way";
 
+vi.mock("../../web/src/gateway/link_to", () => ({
+  linkTo: () => ({ link: { state: new Store<LinkState>({ kind: "connecting" }) }, dispose: () => undefined }),
+}));
 afterEach(clear);
 
 const remoteOf = (members: readonly Member[]) => ({
@@ -31,11 +36,13 @@ const online = (remote: ReturnType<typeof remoteOf>): LinkState => ({
   remote: remote as unknown as Remote,
 });
 
-const showBoard = (state: Store<LinkState>) =>
+const showBoard = (state: Store<LinkState>, board: string | null = null) =>
   show(BoardPage, {
     link: { state },
-    route: { page: "service", device: "d", service: "s", path: [], view: "board", board: null },
-    list: { state: new Store({ kind: "known", devices: [] }) },
+    route: { page: "service", device: "d", service: "s", path: [], view: "board", board },
+    list: {
+      state: new Store({ kind: "known", devices: [{ name: "webcams", services: [{ name: "Webcam" }], safe: [] }] }),
+    },
     onlyStop: false,
   } as unknown as BoardPageProps);
 
@@ -56,4 +63,39 @@ test("Stop calls what the device stops by now, also where it came back with the 
   expect(after.urgent).toHaveBeenCalledWith("e_stop", [], expect.anything());
   expect(before.urgent).not.toHaveBeenCalled();
   expect(find("[data-panel]")).toBe(panel); // as it was, with what it holds
+});
+
+const panelOf = (place: Partial<Panel>): Panel => ({
+  id: "",
+  kind: "notes",
+  title: "",
+  from: "",
+  object: "",
+  settings: {},
+  ...{ x: 0, y: 0, w: 3, h: 5, ...place },
+});
+const packed = (...panels: Panel[]) => packBoard({ panels, columns: 12, stop: null });
+
+test("what another service empties in a panel comes back by Undo", async () => {
+  showBoard(new Store<LinkState>(online(remoteOf([]))), packed(panelOf({ settings: { text: "call Vera" } })));
+  await settle();
+  await press("Arrange");
+  const notes = () => recallBoard("d/s")?.panels.map(({ from, settings }) => [from, settings]);
+  await enter(find<HTMLSelectElement>(".panel-source select"), "webcams/Webcam");
+  expect(text()).toContain("Emptied for another service: Notes");
+  await vi.waitFor(() => expect(notes()).toEqual([["webcams/Webcam", {}]]));
+  await press("Undo");
+  await vi.waitFor(() => expect(notes()).toEqual([["", { text: "call Vera" }]]));
+});
+
+test("no panel is added to a board that could not be read again with it", async () => {
+  const panels = Array.from({ length: MOST_PANELS - 1 }, (_, i) => panelOf({ y: 5 * i }));
+  showBoard(new Store<LinkState>(online(remoteOf([]))), packed(...panels));
+  await settle();
+  await press("Arrange");
+  await press("Add panel");
+  await press("Add panel");
+  expect(document.querySelectorAll("[data-panel]")).toHaveLength(MOST_PANELS);
+  expect(button("Add panel").disabled).toBe(true);
+  expect(recallBoard("d/s")?.panels).toHaveLength(MOST_PANELS);
 });

@@ -44,7 +44,7 @@ export interface Board {
   stop: StopCall | null;
 }
 
-const MOST_PANELS = 64;
+export const MOST_PANELS = 64;
 const MOST_TEXT = 256 * 1024;
 
 /** @throws Error with what is wrong, where, and what was expected. */

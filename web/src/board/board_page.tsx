@@ -20,6 +20,7 @@ import { Definitions, scopeOf } from "../values/definitions";
 import {
   keepBoard,
   makeId,
+  MOST_PANELS,
   packBoard,
   PANEL_KINDS,
   parseBoard,
@@ -113,8 +114,16 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
     setPanels([...here.panels, { id: makeId(), kind, title: "", from: "", object: "", settings: {}, ...place }]);
     setArranging(true);
   };
-  const update = (id: string, change: Partial<Panel>): void =>
-    setBoard({ ...board, panels: board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)) });
+  const withChange = (id: string, change: Partial<Panel>): Board => ({
+    ...board,
+    panels: board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)),
+  });
+  const update = (id: string, change: Partial<Panel>): void => setBoard(withChange(id, change));
+  const chooseService = (panel: Panel, from: string): void => {
+    const next = withChange(panel.id, { from, settings: {} });
+    if (Object.keys(panel.settings).length === 0) return setBoard(next);
+    replace(t("Emptied for another service: {0}", nameOf(panel)), next);
+  };
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
@@ -145,6 +154,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
               move={(place) => setPanels(put(here.panels, panel.id, place, columns))}
               step={(dx, dy) => setPanels(nudge(here.panels, panel.id, dx, dy, columns))}
               update={(change) => update(panel.id, change)}
+              chooseService={(from) => chooseService(panel, from)}
               remove={() => {
                 const left = board.panels.filter(({ id }) => id !== panel.id);
                 replace(t("Removed: {0}", nameOf(panel)), { ...board, panels: settle(left, board.columns) });
@@ -265,6 +275,7 @@ interface BoardToolsProps {
 function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
   const file = useRef<HTMLInputElement>(null);
   const isOpen = arranging || board.panels.length === 0; // nobody looks for the way to begin
+  const isFull = board.panels.length >= MOST_PANELS; // a larger one could not be read again
   const [kind, setKind] = useState<PanelKind>("plot");
   const save = (): void =>
     saveFile(
@@ -303,7 +314,13 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
               ))}
             </select>
           </label>
-          <button class="button" type="button" onClick={() => add(kind)}>
+          <button
+            class="button"
+            type="button"
+            disabled={isFull}
+            title={isFull ? t("A board has at most {0} panels.", MOST_PANELS) : undefined}
+            onClick={() => add(kind)}
+          >
             {t("Add panel")}
           </button>
           <button class="button button-quiet" type="button" onClick={save}>

@@ -30,6 +30,8 @@ export interface PanelFrameProps {
   move: Change;
   step: (dx: number, dy: number) => void;
   update: (change: Partial<Panel>) => void;
+  /** What is set is for the members of the service before, and goes with it. */
+  chooseService: (from: string) => void;
   remove: () => void;
 }
 
@@ -43,6 +45,7 @@ export function PanelFrame({
   move,
   step,
   update,
+  chooseService,
   remove,
 }: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
@@ -102,11 +105,7 @@ export function PanelFrame({
         <div class="panel-source">
           <label>
             <span class="unseen">{t("Service")}</span>
-            <select
-              class="field"
-              value={panel.from}
-              onChange={(event) => update({ from: event.currentTarget.value, settings: {} })}
-            >
+            <select class="field" value={panel.from} onChange={(event) => chooseService(event.currentTarget.value)}>
               <option value="">{t("this service")}</option>
               {[...new Set([...services, ...(panel.from === "" ? [] : [panel.from])])].map((each) => (
                 <option key={each} value={each}>
