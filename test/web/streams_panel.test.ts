@@ -20,20 +20,23 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
+const controls: Remote["controls"] = new Map();
+
 /** An object whose wire is open, and says nothing. */
-const objectOf = (account: Account): Remote => {
+const objectOf = (account: Account, of: Partial<Remote> = {}): Remote => {
   const wire = async function* (_: string, signal: AbortSignal, opened?: (account: Account) => void) {
     opened?.(account);
     await new Promise((resolve) => signal.addEventListener("abort", resolve));
   };
-  return { wire } as unknown as Remote;
+  return { wire, path: "s", controls, ...of } as unknown as Remote;
 };
 
 test("values of this page that were lost, and how long others waited, stand beside the sum of all clients", async () => {
   const losses = { delivered: 90, conflated: 7, dropped: 1, ageP50: 2, ageP99: 14 };
-  const { close } = openFeed(objectOf({ losses: () => Promise.resolve(losses) }), "wire", "state");
+  const object = objectOf({ losses: () => Promise.resolve(losses) });
+  const { close } = openFeed(object, "wire", "state");
   const place = { device: "d", service: "s", object: "" };
-  const update = show(StreamsPanel, { place } as PanelProps);
+  const update = show(StreamsPanel, { object, place } as PanelProps);
   await settle();
   await update();
   expect(text()).toContain("2 ms, 99 % 14 ms");
@@ -49,4 +52,26 @@ test("where no account is kept of them, none is told", async () => {
   expect(text()).toContain("other");
   expect(text()).not.toContain("here");
   close();
+});
+
+test("what all clients lost is told only of the object that lost it", async () => {
+  const none = { losses: () => Promise.reject(new Error("no")) };
+  const [root, child, other] = [
+    objectOf(none),
+    objectOf(none, { path: "s.arms[0]" }),
+    objectOf(none, { controls: new Map() }), // of another device
+  ];
+  const feeds = [root, child, other].map((object) => openFeed(object, "wire", "state"));
+  const update = show(StreamsPanel, { object: root, place: { device: "d", service: "s", object: "" } } as PanelProps);
+  await settle();
+  await update();
+  const rows = [...document.querySelectorAll("tbody tr")].map((row) =>
+    [row.querySelector("th"), row.lastElementChild].map((cell) => cell?.textContent),
+  );
+  expect(rows).toEqual([
+    ["state wire, s", "3 for all clients"],
+    ["state wire, s.arms[0]", "–"],
+    ["state wire, s", "–"],
+  ]);
+  for (const { close } of feeds) close();
 });

@@ -7,6 +7,7 @@ import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
 import { itemsOf } from "../gateway/polled_list";
 import { subscriptionsAt } from "../gateway/subscriptions";
+import type { Subscription } from "../gateway/subscriptions";
 import { isUsb } from "../gateway/usb_devices";
 import { openFeeds } from "../live/feed";
 import type { Feed } from "../live/feed";
@@ -19,7 +20,7 @@ type Losses = Awaited<ReturnType<NonNullable<Feed["account"]>["losses"]>>;
 
 const ACCOUNT_MS = 3_000;
 
-export default function StreamsPanel({ place }: PanelProps) {
+export default function StreamsPanel({ object, place }: PanelProps) {
   useNow(250);
   const list = useMemo(() => subscriptionsAt(place.device), [place.device]);
   useEffect(() => {
@@ -45,13 +46,18 @@ export default function StreamsPanel({ place }: PanelProps) {
         <tbody>
           {openFeeds().map((feed, i) => {
             const age = feed.pace.ageMs(now);
-            const account = lost.filter(({ member, kind }) => member === feed.member && kind === feed.kind);
+            // The list is of the panel's device; another one may have an object of the same path.
+            const isOfList = feed.object.controls === object?.controls;
+            const account = isOfList ? lost.filter((each) => isOf(each, feed)) : [];
             const missed = account.reduce((sum, { conflated, dropped }) => sum + conflated + dropped, 0);
             const here = own.get(feed);
             return (
               <tr key={i} class={feed.pace.isStale(now) ? "is-old" : ""}>
                 <th scope="row">
-                  {feed.member} <small>{t(feed.kind)}</small>
+                  {feed.member}{" "}
+                  <small>
+                    {t(feed.kind)}, {feed.object.path}
+                  </small>
                 </th>
                 <td>{t("{0} a second", formatRate(feed.pace.rate(now)))}</td>
                 <td>{age === null ? "–" : oldness(age)}</td>
@@ -69,6 +75,10 @@ export default function StreamsPanel({ place }: PanelProps) {
       </table>
     </div>
   );
+}
+
+function isOf({ path, member, kind }: Subscription, feed: Feed): boolean {
+  return path === feed.object.path && member === feed.member && kind === feed.kind;
 }
 
 /** Of this page's own connections, asked again every few seconds. */
