@@ -23,11 +23,11 @@ export function PropertyRow({ object, member, live, route }: MemberRowProps) {
   const readAt = useRef<number | null>(null);
   const isCurrent = live && reading.failure === null;
   const age = useAge(() => (isCurrent ? null : readAt.current));
-  const readValue = async (): Promise<void> => {
-    setShown(formatValue(await object.get(member.name)));
-    readAt.current = performance.now();
-  };
-  const read = (): void => reading.run(readValue);
+  const read = (): void =>
+    reading.run(async () => {
+      setShown(formatValue(await object.get(member.name)));
+      readAt.current = performance.now();
+    });
   useEffect(() => {
     if (live && readable) read();
   }, [object, live]);
@@ -35,7 +35,7 @@ export function PropertyRow({ object, member, live, route }: MemberRowProps) {
     event.preventDefault();
     writing.run(async () => {
       await object.set(member.name, parseInput(text, member.type), PATIENT);
-      if (readable) await readValue();
+      if (readable) read(); // what fails there says nothing of what was set
     });
   };
   return (

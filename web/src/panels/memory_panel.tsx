@@ -63,6 +63,8 @@ function Items({ object, place, name, member, view }: ItemsProps) {
   const [text, setText] = useState("");
   const [shown, setShown] = useState<{ value: unknown; from: number } | null>(null);
   const acting = useAction();
+  const writing = useAction();
+  const [hasWritten, setWritten] = useState(false);
   const placed = useRef(""); // the size that Position and Items are for: they stay over an outage, as the new items do
   useEffect(() => {
     setShown(null);
@@ -78,25 +80,29 @@ function Items({ object, place, name, member, view }: ItemsProps) {
     });
   }, [object]);
   const numbers = (given: string): number[] => Array.from(parseInput(given, "uint32[]") as ArrayLike<number>);
-  const readItems = async (): Promise<void> => {
-    const at = numbers(position);
-    const value = await object?.read(name, at, numbers(count));
-    setShown({ value, from: at[0] ?? 0 });
-  };
+  const read = (): void =>
+    acting.run(async () => {
+      const at = numbers(position);
+      const value = await object?.read(name, at, numbers(count));
+      setShown({ value, from: at[0] ?? 0 });
+    });
+  const isReadable = member?.modifiers.includes("writeonly") === false;
   const write = (event: Event): void => {
     event.preventDefault();
-    acting.run(async () => {
+    setWritten(false);
+    writing.run(async () => {
       await object?.write(name, numbers(position), parseInput(text, member?.type ?? ""));
-      await readItems();
+      setWritten(true);
+      if (isReadable) read(); // what fails there says nothing of what was written
     });
   };
-  const off = !object || !member || acting.busy;
+  const off = !object || !member || acting.busy || writing.busy;
   return (
     <>
-      <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), acting.run(readItems))}>
+      <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), read())}>
         <TextField label={t("Position")} text={position} change={setPosition} />
         <TextField label={t("Items")} text={count} change={setCount} />
-        <button class="button" type="submit" disabled={off}>
+        <button class="button" type="submit" disabled={off || !isReadable}>
           {t("Read")}
         </button>
         <p class="note">{size.length === 0 ? "" : t("{0} items", size.join(" × "))}</p>
@@ -109,8 +115,10 @@ function Items({ object, place, name, member, view }: ItemsProps) {
           <button class="button" type="submit" disabled={off}>
             {t("Write")}
           </button>
+          {hasWritten && <output class="note">{t("done")}</output>}
         </form>
       )}
+      <Refusal failure={writing.failure} isLocked={writing.isLocked} object={object} place={place} />
     </>
   );
 }
