@@ -1,4 +1,5 @@
 // Every text of the page goes through t(), and has a German one, with the same places for values.
+import { STANDARD } from "../../web/src/board/presets";
 import german from "../../web/src/messages/de";
 
 const files = import.meta.glob<string>("../../web/src/**/*.{ts,tsx}", {
@@ -17,6 +18,14 @@ test("all texts are there in German, with the same values", () => {
   expect([...texts].filter((text) => !Object.hasOwn(german, text))).toEqual([]);
   for (const [text, other] of Object.entries(german))
     expect(other.match(/\{\d\}/g)?.sort() ?? [], text).toEqual(text.match(/\{\d\}/g)?.sort() ?? []);
+});
+
+test("titles of the panels that boards begin with are there in German", () => {
+  const titles = Object.values(STANDARD).flatMap(({ panels }) =>
+    panels.flatMap(([, , , , , , title]) => (title === undefined ? [] : [title])),
+  );
+  expect(titles.length).toBeGreaterThan(25);
+  expect(titles.filter((title) => !Object.hasOwn(german, title))).toEqual([]);
 });
 
 test("no text between tags, and none that is read aloud, goes past t()", () => {

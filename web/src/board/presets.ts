@@ -54,7 +54,7 @@ const POINTS: Preset = {
   ],
 };
 const ROBOT = "com.robotraconteur.robotics.robot.Robot";
-const STANDARD: Readonly<Record<string, Preset>> = {
+export const STANDARD: Readonly<Record<string, Preset>> = {
   [ROBOT]: {
     stop: ROBOT_STOP,
     panels: [
