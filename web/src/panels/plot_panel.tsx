@@ -23,6 +23,7 @@ import { lonely, measuredAt, Trace, toCsv } from "./trace";
 import "./plot_panel.css";
 
 const DRAW_MS = 100;
+const LOOK_MS = 1_000;
 const AT_FIRST = 4;
 const WINDOWS = [10, 30, 120, 600];
 
@@ -147,10 +148,7 @@ export default function PlotPanel(props: PanelProps) {
             source={source}
             trace={trace}
             isNamed={!isOne}
-            find={(paths) => {
-              if (Object.hasOwn(found, source.name) && found[source.name]?.object === object) return;
-              setFound((old) => ({ ...old, [source.name]: { object, paths: paths() } }));
-            }}
+            find={(paths) => setFound((old) => withFound(old, source.name, object, paths))}
           />
         ))}
         <SeriesChoice sources={sources} label={label} pick={pick} />
@@ -184,15 +182,19 @@ interface FollowProps {
   trace: Trace;
   /** Beside others: it says which it is. */
   isNamed: boolean;
-  find: (paths: () => readonly string[]) => void;
+  find: (paths: readonly string[]) => void;
 }
 
 /** Writes what comes from a member into the trace, and says how fresh it is. Apart, since that changes ten times a second. */
 function Follow({ object, source, trace, isNamed, find }: FollowProps) {
   const { name, kind, paths, from } = source;
   const readers = useMemo(() => paths.map(numberReader), [JSON.stringify(paths)]);
+  const looked = useRef({ object, at: -Infinity });
   useEach(object, kind, name, (value, now, isAfterGap) => {
-    find(() => numberPaths(value));
+    if (looked.current.object !== object || now - looked.current.at >= LOOK_MS) {
+      looked.current = { object, at: now };
+      find(numberPaths(value));
+    }
     if (readers.length === 0) return;
     if (isAfterGap) trace.breakOff(from, readers.length);
     const numbers = readers.map((read) => read(value));
@@ -237,6 +239,12 @@ function SeriesChoice({ sources, label, pick }: SeriesChoiceProps) {
       </ul>
     </details>
   );
+}
+
+/** The same where there is nothing new: of one object the longest list, since an array may be empty at first. */
+function withFound(old: Found, name: string, object: Remote | null, paths: readonly string[]): Found {
+  const known = Object.hasOwn(old, name) ? old[name] : undefined;
+  return known?.object === object && paths.length <= known.paths.length ? old : { ...old, [name]: { object, paths } };
 }
 
 /** `state.x`, `joints[2]`, `speed`. */
