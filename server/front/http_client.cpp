@@ -370,10 +370,8 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   }
   auto memory = gateway.memory().charge(network_name(request.arrival.address));
   const bool is_urgent = passes && passes(request.identity);
-  if (!admitted.refusal && !is_refused && makes_work(request) && !is_urgent && !memory.has_room(least_room)) {
-    gateway.reject(Rejection::memory);
-    admitted.refusal = no_memory_response();
-  }
+  if (!admitted.refusal && !is_refused && makes_work(request) && !is_urgent && !memory.has_room(least_room))
+    admitted.refusal = refuse_for_memory(&gateway.metrics());
   if (admitted.refusal && asks_for_websocket(request)) {
     co_await write_refusal(gateway, *stream, *admitted.refusal);
     co_await stream->end(rr::no_reason);

@@ -43,7 +43,8 @@ std::string ResponseWriter::head_of(const Response& response) const {
   return format_response_head(whole, goes_on(), minor_version());
 }
 
-Response no_memory_response() {
+Response refuse_for_memory(Metrics* metrics) {
+  if (metrics) metrics->reject(Rejection::memory);
   auto response = problem_response(503, "the gateway has no memory left for this; try again in a moment");
   response.set("Retry-After", "2");
   return response;
@@ -90,7 +91,7 @@ bool ResponseWriter::make_room(const std::shared_ptr<const std::string>& body) {
 
 rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
   const bool fits = is_vital_ || make_room(whole.body);
-  const Response no_memory = fits ? Response() : no_memory_response();
+  const Response no_memory = fits ? Response() : refuse_for_memory(metrics_);
   const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;
   note_begin(response);

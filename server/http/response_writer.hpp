@@ -27,8 +27,8 @@ struct ResponseOptions {
   Metrics* metrics = nullptr;  ///< where responses are counted; null: nowhere
 };
 
-/// 503: what clients may make the gateway hold is used up.
-Response no_memory_response();
+/// 503: what clients may make the gateway hold is used up. Counted in `metrics`; null: nowhere.
+Response refuse_for_memory(Metrics* metrics);
 
 /// For one request; call either send(), or begin(), write() as often as wanted, and end().
 class ResponseWriter {

@@ -372,10 +372,7 @@ std::optional<Response> refuse_too_much(GatewayState& gateway, const Request& re
     room.hold(needed);
     return std::nullopt;
   }
-  if (!has_room) {
-    gateway.reject(Rejection::memory);
-    return no_memory_response();
-  }
+  if (!has_room) return refuse_for_memory(&gateway.metrics());
   gateway.reject(Rejection::rate);
   return gateway.http_access().refuse_too_much(request.identity, nullptr, request.too_much);
 }

@@ -81,7 +81,9 @@ class FakeClient final : public rr::ByteStream {
 
 struct Exchange {
   explicit Exchange(std::size_t memory = 1'000'000, milliseconds patience = milliseconds(60'000))
-      : budget(memory), writer(client, reader, request, budget.charge("a"), ResponseOptions{.patience = patience}) {
+      : budget(memory),
+        writer(client, reader, request, budget.charge("a"),
+               ResponseOptions{.patience = patience, .metrics = &metrics}) {
     request.message.version(11);
   }
   /// Until nothing more happens, or the work is done.
@@ -102,6 +104,7 @@ struct Exchange {
   RequestReader reader{client, {8192, milliseconds(1000), milliseconds(1000)}};
   Request request;
   MemoryBudget budget;
+  Metrics metrics;
   ResponseWriter writer;
 };
 
@@ -130,6 +133,7 @@ TEST_CASE("a response that there is no memory for becomes 503; one that others h
   CHECK_THAT(exchange.client.received, Catch::StartsWith("HTTP/1.1 503 ") && Catch::Contains("no memory left") &&
                                            Catch::Contains("Retry-After: 2\r\n"));
   CHECK(exchange.budget.refusals() == 1);
+  CHECK(exchange.metrics.rejected[static_cast<std::size_t>(Rejection::memory)] == 1);
   exchange.client.received.clear();
   exchange.run([&]() -> rr::awaitable<void> {
     const auto fits = text_response(200, "text/plain", std::string(100'000, 'x'));

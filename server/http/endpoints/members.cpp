@@ -19,10 +19,8 @@ rr::awaitable<Response> value_response(const ObjectRequest& request, const Targe
   if (wanted.empty() || !is_image_type(type, target.types())) co_return co_await request.value_response(target, value);
   const auto work = value_or_throw(prepare_image(value, type, target.types(), wanted));
   auto room = request.writer().memory().sibling();
-  if (!room.resize(3 * work.data.bytes().size())) {
-    request.gateway().reject(Rejection::memory);
-    co_return no_memory_response();
-  }  // the rows, and what becomes of them
+  if (!room.resize(3 * work.data.bytes().size()))  // the rows, and what becomes of them
+    co_return refuse_for_memory(&request.gateway().metrics());
   const auto encode = [&work] { return encode_image(work); };
   auto bytes = value_or_throw(co_await request.gateway().workers().run(encode));
   auto response = text_response(200, wanted, std::move(bytes));

@@ -215,10 +215,7 @@ rr::awaitable<Response> ObjectRequest::value_response(const Target& target, cons
 rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
   const auto held = held_bytes(json);
   auto room = writer_.memory().sibling();
-  if (held > large_json_bytes && !room.resize(held)) {
-    gateway_.reject(Rejection::memory);
-    co_return no_memory_response();
-  }
+  if (held > large_json_bytes && !room.resize(held)) co_return refuse_for_memory(&gateway_.metrics());
   const bool is_cbor = wanted_ == BodyForm::cbor;
   // It is the worker that frees a large one, too: that takes as long as to write it.
   auto write = [json = std::move(json), is_cbor] {
