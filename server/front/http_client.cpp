@@ -10,6 +10,7 @@
 #include "server/front/page_device.hpp"
 #include "server/front/refused_client.hpp"
 #include "server/front/serve_shared_client.hpp"
+#include "server/http/endpoints/object_request.hpp"
 #include "server/http/endpoints/objects.hpp"
 #include "server/http/other_pages.hpp"
 #include "server/http/response_writer.hpp"
@@ -28,6 +29,21 @@ constexpr std::size_t longest_way = 1024;
 
 constexpr std::string_view devices_prefix = "/devices/";
 constexpr std::string_view gateway_path = "/gateway";
+
+Rejection rejection_of(unsigned status) {
+  switch (status) {
+    case 400:
+      return Rejection::bad_request;
+    case 401:
+      return Rejection::unauthorized;
+    case 404:
+      return Rejection::no_such_device;
+    case 429:
+      return Rejection::rate;
+    default:
+      return Rejection::forbidden;
+  }
+}
 
 /// What a connection goes on as when HTTP is done with it; not valid() where it has ended.
 using Continuation = rr::awaitable<void>;
@@ -105,10 +121,11 @@ rr::awaitable<Continuation> accept_json_socket(GatewayState& gateway, Connection
                                                rr::ByteSpan unread) {
   const auto place = find_json_socket(gateway, request);
   if (!place) {
-    const bool is_denied = place.error().code == rr::ErrorCode::permission_denied;
-    gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
-    const auto response = is_denied ? gateway.http_access().refusal(request, place.error())
-                                    : problem_response(404, place.error().message);
+    const auto status = status_of(place.error().code);
+    gateway.reject(rejection_of(status));
+    auto response = status == 403 ? gateway.http_access().refusal(request, place.error())
+                                  : problem_response(status, place.error().message);
+    if (status == 401) response.set("WWW-Authenticate", device_challenge);
     co_await write_refusal(gateway, *stream, response);
     co_await stream->end(rr::no_reason);
     co_return Continuation();
@@ -324,10 +341,6 @@ void note_unreadable(GatewayState& gateway, const Connection& connection, const 
   gateway.reject(failure.status == 503 ? Rejection::memory : Rejection::bad_request);
   gateway.log_refusal(LogLevel::info, "request refused", connection.client,
                       {{"peer", connection.client}, {"status", failure.status}, {"detail", failure.detail}});
-}
-
-Rejection rejection_of(unsigned status) {
-  return status == 429 ? Rejection::rate : status == 401 ? Rejection::unauthorized : Rejection::forbidden;
 }
 
 /// At its end a connection is not judged any more.

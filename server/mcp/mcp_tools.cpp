@@ -231,7 +231,7 @@ rr::awaitable<TargetPtr> McpTools::find(JsonRequestPtr arguments, bool is_urgent
     refuse(rr::ErrorCode::out_of_system_resource,
            "too many requests to device " + rr::quote(device->config().name) + "; try again in a second");
   }
-  auto key = session_key(gateway_, reply_.request(), segments.front());
+  auto key = value_or_throw(session_key(gateway_, reply_.request(), segments.front()));
   auto from = reply_.request().origin();
   has_asked_device_ = true;
   auto client = value_or_throw(co_await open_session(gateway_, std::move(device), std::move(key), std::move(from)));

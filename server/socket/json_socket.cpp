@@ -32,7 +32,9 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   place->device = device->shared_from_this();
   place->standing = std::make_shared<Standing>(gateway.access(), request.identity);
   place->from = request.origin();
-  place->key = session_key(gateway, request, (*segments)[1]);
+  auto key = session_key(gateway, request, (*segments)[1]);
+  if (!key) return key.error();
+  place->key = std::move(*key);
   place->segments.assign(segments->begin() + 2, segments->end());
   place->form = json_form(request);
   place->trace = trace_id_of(request.header("traceparent"));

@@ -4,7 +4,6 @@
 #include "core/support/words.hpp"
 #include "node/http/foreign_page.hpp"
 #include "node/http/upgrade.hpp"
-#include "node/tls/base64.hpp"
 #include "server/http/sign_in_cookie.hpp"
 #include "server/json/json.hpp"
 #include "server/limits/client_network.hpp"
@@ -17,15 +16,6 @@ namespace {
 
 rr::Error refused(std::string why) {
   return rr::make_error(rr::ErrorCode::authentication_error, std::move(why));
-}
-
-/// What follows "Basic " or "Bearer "; nullopt: another scheme.
-std::optional<std::string_view> credentials_of(std::string_view header, std::string_view scheme) {
-  if (header.size() <= scheme.size() || header[scheme.size()] != ' ' ||
-      !equals_ignoring_case(header.substr(0, scheme.size()), scheme))
-    return std::nullopt;
-  header.remove_prefix(scheme.size());
-  return header.substr(std::min(header.find_first_not_of(' '), header.size()));
 }
 
 /// Anonymous where no proxy that is trusted says more.
@@ -107,10 +97,11 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_authorization(std::string hea
     identity->face = from.face;
     co_return access_.with_grants(std::move(*identity));
   }
-  const auto basic = credentials_of(header, "Basic");
-  if (!basic || !state.users) co_return nobody;
-  std::string credentials(*basic);
-  co_return co_await by_password(std::move(credentials), std::move(from));
+  if (!state.users) co_return nobody;
+  auto basic = basic_credentials(header);
+  if (!basic) co_return basic.error();
+  if (!*basic) co_return nobody;
+  co_return co_await by_password(std::move(**basic), std::move(from));
 }
 
 rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
@@ -120,14 +111,10 @@ rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
   return state.tokens->verify(token, now);
 }
 
-rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credentials, ClientOrigin from) {
-  const auto decoded = rr::decode_base64(credentials);
-  const std::string text = decoded ? std::string(decoded->begin(), decoded->end()) : "";
-  const auto colon = text.find(':');
-  if (colon == std::string::npos) co_return refused("Basic credentials can't be read");
+rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(BasicCredentials credentials, ClientOrigin from) {
   rr::LoginAttempt attempt;
-  attempt.username = text.substr(0, colon);
-  attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(text).substr(colon + 1)));
+  attempt.username = std::move(credentials.username);
+  attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(credentials.password)));
   const auto client = from.client;
   const auto face = from.face;
   const auto user = co_await logins_.judge(std::move(attempt), std::move(from), Logins::Of::request);

@@ -10,6 +10,7 @@
 
 #include "server/access/access.hpp"
 #include "server/access/access_requests.hpp"
+#include "server/access/authorization.hpp"
 #include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/http/request.hpp"
@@ -74,7 +75,7 @@ class HttpAccess {
 
  private:
   rr::Result<Identity> by_token(std::string_view token) const;
-  rr::awaitable<rr::Result<Identity>> by_password(std::string credentials, ClientOrigin from);
+  rr::awaitable<rr::Result<Identity>> by_password(BasicCredentials credentials, ClientOrigin from);
 
   Access& access_;
   Logins& logins_;

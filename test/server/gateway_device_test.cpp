@@ -4,6 +4,7 @@
 
 #include "test/node/node/node_fixture.hpp"
 #include "test/server/support/test_gateway.hpp"
+#include "test/support/folder.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;
@@ -272,4 +273,29 @@ TEST_CASE("who comes to a shared device that is away hears so") {
       refusal_of("rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=robot&service=Robot");
   CHECK(refusal.code == rr::ErrorCode::connection_error);
   CHECK_THAT(refusal.message, Catch::Contains("device 'robot' is offline"));
+}
+
+TEST_CASE("Basic credentials that can't be read are refused, whether they are for the gateway or for the device") {
+  const bool are_for_gateway = GENERATE(false, true);
+  Robot robot;
+  const Folder files;
+  TestGateway gateway(0, [&](Config& config) {
+    with(robot)(config);
+    if (are_for_gateway) config.access.users_file = files.write("users", "");
+  });
+  gateway.wait_for("/readyz", [](const auto& ready) { return ready["devices_online"] == 1; });
+  const std::string place = "/api/v1/devices/robot/Robot";
+  const std::string no_base64 = "Authorization: Basic !\r\n", no_colon = "Authorization: Basic YWxpY2U=\r\n";
+  for (const auto& lines : {no_base64, no_colon}) {
+    TestClient client(gateway.port());
+    for (const auto& path : {place + "/one", std::string("/api/v1/devices/robot/openapi.json")}) {
+      client.send("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n" + lines + "\r\n");
+      const auto refused = client.receive_response();
+      CHECK(refused.status == 401);
+      CHECK_THAT(refused.head, Catch::Contains("WWW-Authenticate: Basic "));
+      CHECK_THAT(refused.body, Catch::Contains("Basic credentials can't be read"));
+    }
+    TestClient socket(gateway.port());
+    CHECK(socket.upgrade(place, "Sec-WebSocket-Protocol: rrgate.json.v1\r\n" + lines).status == 401);
+  }
 }

@@ -3,8 +3,8 @@
 
 #include "core/session/service_path.hpp"
 #include "core/types/value_size.hpp"
-#include "node/tls/base64.hpp"
 #include "node/values/exception.hpp"
+#include "server/access/authorization.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/state/http_access.hpp"
@@ -84,18 +84,14 @@ bool is_apart(const rr::TypeDefinition& type) {
   return type.name.empty() && type.type != rr::DataType::varvalue_t;
 }
 
-SessionKey session_key(GatewayState& gateway, const Request& request, std::string service) {
+rr::Result<SessionKey> session_key(GatewayState& gateway, const Request& request, std::string service) {
   SessionKey key{std::move(service)};
   if (gateway.http_access().takes_basic()) return key;
-  constexpr std::string_view basic = "Basic ";
-  const auto header = request.header(http::field::authorization);
-  if (!equals_ignoring_case(header.substr(0, basic.size()), basic)) return key;
-  const auto decoded = rr::decode_base64(header.substr(basic.size()));
-  if (!decoded) return key;
-  const std::string text(decoded->begin(), decoded->end());
-  const auto colon = text.find(':');
-  key.username = text.substr(0, colon);
-  if (colon != std::string::npos) key.password = text.substr(colon + 1);
+  auto basic = basic_credentials(request.header(http::field::authorization));
+  if (!basic) return basic.error();
+  if (!*basic) return key;
+  key.username = std::move((*basic)->username);
+  key.password = std::move((*basic)->password);
   return key;
 }
 
@@ -251,7 +247,7 @@ Response ObjectRequest::error_response(const rr::Error& error, const rr::TypeReg
   rr::add_key(problem, "error") = told["error"];
   auto response = text_response(status, "application/problem+json", rr::write_json(problem) + "\n");
   response.set("Cache-Control", "no-store");
-  if (status == 401) response.set("WWW-Authenticate", "Basic realm=\"device\"");
+  if (status == 401) response.set("WWW-Authenticate", device_challenge);
   if (status == 503) response.set("Retry-After", "2");
   return response;
 }

@@ -42,8 +42,12 @@ struct Target {
 /// client opens an object whose definition comes later. Workers must not look into it.
 bool is_apart(const rr::TypeDefinition& type);
 
+/// WWW-Authenticate where it is the device that wants a login.
+inline constexpr const char* device_challenge = "Basic realm=\"device\"";
+
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
-SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
+/// Errors   those of basic_credentials().
+rr::Result<SessionKey> session_key(GatewayState& gateway, const Request& request, std::string service);
 /// A client of that session, for somebody from there. Where a login has to be judged by the device first, that is
 /// bounded and recorded. Errors   those of ValueClients::open() and Logins::begin_at_device().
 rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayState& gateway,

@@ -147,9 +147,9 @@ Response find_document(GatewayState& gateway, const std::string& document, const
   return known;
 }
 
-/// A document about the device, or one of its definitions: from sessions with all its services.
+/// A document about the device, or one of its definitions: from sessions with all its services. `login`  of each.
 rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const ObjectRequest& request,
-                                   std::string name) {
+                                   std::string name, SessionKey login) {
   auto& writer = request.writer();
   std::vector<std::shared_ptr<const rr::TypeRegistry>> kept;
   std::vector<DescribedService> services;
@@ -163,7 +163,8 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
   for (const auto& service : names) {
     auto* still_there = gateway.devices().find(device_name);
     if (!still_there) break;
-    auto key = session_key(gateway, writer.request(), service);
+    auto key = login;
+    key.service = service;
     auto from = writer.request().origin();
     auto asked = still_there->shared_from_this();
     const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
@@ -224,9 +225,15 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     co_await writer.send(response);
     co_return;
   }
+  auto key = session_key(gateway, writer.request(), service);
+  if (!key) {
+    const auto response = request.error_response(key.error(), nullptr);
+    co_await writer.send(response);
+    co_return;
+  }
   if (!is_object) {
     if (request.is_read()) {
-      co_await serve_document(gateway, *device, request, segments[1]);
+      co_await serve_document(gateway, *device, request, segments[1], std::move(*key));
     } else {
       const auto response = request.method_response("GET, HEAD");
       co_await writer.send(response);
@@ -239,11 +246,10 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   const auto method = writer.request().message.method_string();
   const CallLog logged(trace, device->config().name, {method.data(), method.size()},
                        std::string(writer.request().path()));
-  auto key = session_key(gateway, writer.request(), service);
   auto from = writer.request().origin();
   auto asked = device->shared_from_this();
   const bool is_urgent = is_urgent_member(*device, segments);
-  const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
+  const auto client = co_await open_session(gateway, std::move(asked), std::move(*key), std::move(from));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
