@@ -3,6 +3,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "core/session/service_path.hpp"
 #include "server/front/session_end.hpp"
 #include "server/log/log.hpp"
 #include "server/rr/shared_access.hpp"
@@ -92,7 +93,7 @@ bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::
 /// See AccessRequest. Asked only where what can't be recorded is not done: packets of streams come here, too.
 bool is_vital(GatewayState& gateway, const SharedNode& node, const rr::MemberAccess& wanted) {
   if (!gateway.access().state().config.audit.fails_closed) return false;
-  const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+  const auto device = node.device_of(rr::first_segments(wanted.path, 1));
   if (device == gateway_device && wanted.member && wanted.member->name == "renew_lease") return true;
   return is_of_urgent_member(gateway, device, wanted);
 }
@@ -104,7 +105,7 @@ auto make_entrance(GatewayState& gateway, const SharedNode& node, const Connecti
   return [&gateway, &node, memory, rights = std::move(rights), network = connection.network,
           shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<rr::RequestPass>> {
-    const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+    const auto device = node.device_of(rr::first_segments(wanted.path, 1));
     const bool passes = is_urgent(gateway, device, wanted);
     if (!passes && !memory->has_room(least_room))
       return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");

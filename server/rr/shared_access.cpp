@@ -1,6 +1,7 @@
 #include "server/rr/shared_access.hpp"
 
 #include "core/session/service/service_index.hpp"
+#include "core/session/service_path.hpp"
 
 namespace rrgate {
 
@@ -124,7 +125,7 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted, bool is_vital)
   if (wanted.type == rr::EntryType::get_node_info)
     return wanted.path.empty() ? asker.check({.verb = Verb::admin}, Recorded::never)
                                : asker.check({.device = wanted.path}, Recorded::never);
-  const auto service = wanted.path.substr(0, wanted.path.find('.'));
+  const auto service = rr::first_segments(wanted.path, 1);
   if (service == rr::service_index_name) return {};  // it tells each client what that may know
   if (!wanted.member && is_about_service(wanted.type)) return admit_to_service(asker, wanted, service);
   if (wanted.type == rr::EntryType::client_session_op_req) return {};
@@ -143,7 +144,7 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted, bool is_vital)
 rr::Result<> SessionRights::admit_lock(std::string_view path, const rr::AuthenticatedUser* user, Recorded recorded) {
   if (access_.is_open() && !access_.audit().is_used()) return {};
   AccessRequest request{.path = path, .verb = Verb::lock};
-  request.service = path.substr(0, path.find('.'));
+  request.service = rr::first_segments(path, 1);
   const auto device = node_.device_of(request.service);
   request.device = device;
   return standing_of(user).check(request, recorded);
@@ -157,7 +158,7 @@ AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
 }
 
 void SessionRights::record_too_much(const rr::MemberAccess& admitted, std::string_view why) {
-  const auto service = admitted.path.substr(0, admitted.path.find('.'));
+  const auto service = rr::first_segments(admitted.path, 1);
   const auto device = node_.device_of(service);
   AccessRequest what{.device = device, .service = service, .path = admitted.path};
   if (admitted.member) what.member = admitted.member->name;
@@ -170,7 +171,7 @@ AuditEntryPtr SessionRights::begin_lock(const rr::LockWanted& wanted, const rr::
 }
 
 AuditEntryPtr SessionRights::begin(AccessRequest what, const rr::AuthenticatedUser* user, std::string_view event) {
-  what.service = what.path.substr(0, what.path.find('.'));
+  what.service = rr::first_segments(what.path, 1);
   const auto device = node_.device_of(what.service);
   what.device = device;
   return standing_of(user).begin(what, event);

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/session/service_path.hpp"
 #include "node/http/upgrade.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
@@ -22,7 +23,7 @@ nlohmann::ordered_json safe_members(const Device& device, const Identity& asker,
   const auto& config = device.config();
   if (!device.is_shared() || !config.leases.is_offered) return out;
   for (const auto& action : config.leases.safe) {
-    const auto service = std::string_view(action.path).substr(0, action.path.find('.'));
+    const auto service = rr::first_segments(action.path, 1);
     const AccessRequest lease{.device = config.name, .service = service, .path = action.path, .verb = Verb::lock};
     if (access.state().rules.check(asker, lease)) out.push_back(action.path + "." + action.member);
   }

@@ -94,13 +94,6 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
 
 constexpr std::string_view objects_prefix = "/api/v1/devices/";
 
-/// `segments`  device, service, and those of a member.
-bool is_urgent_member(const Device& device, const std::vector<std::string>& segments) {
-  std::string place = segments[1];
-  for (std::size_t i = 2; i < segments.size(); ++i) place += "." + segments[i];
-  return device.config().leases.is_urgent(place);
-}
-
 /// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, it is not
 /// there, or it is asked for too much. Rights come first: strangers are not told what there is. nullopt: go on, with
 /// the pass.
@@ -248,26 +241,15 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
                        std::string(writer.request().path()));
   auto from = writer.request().origin();
   auto asked = device->shared_from_this();
-  const bool is_urgent = is_urgent_member(*device, segments);
   const auto client = co_await open_session(gateway, std::move(asked), std::move(*key), std::move(from));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
   if (client) {
     auto used = *client;
-    if (const auto lease = writer.request().header(lease_header); !lease.empty()) {
-      const auto holder = gateway.lease_holders().find(lease);
-      const bool is_known = holder != gateway.lease_holders().end();
-      // What was sent under a lease moves nothing once it has ended, though nobody else has one.
-      if (!is_known && !request.is_read() && !request.option("lease") && !is_urgent) {
-        const auto ended = rr::make_error(rr::ErrorCode::object_locked_error,
-                                          "the lease of this Rrgate-Lease has ended: take it again");
-        const auto response = request.error_response(ended, nullptr);
-        co_await writer.send(response);
-        co_return;
-      }
-      if (is_known && holder->second.client->upstream() == used->upstream()) used = holder->second.client;
-    }
+    if (const auto holder = gateway.lease_holders().find(writer.request().header(lease_header));
+        holder != gateway.lease_holders().end() && holder->second.client->upstream() == used->upstream())
+      used = holder->second.client;
     std::optional<rr::Error> unseen;
     LookJudge may_look = [&](const AccessRequest& object) {
       auto allowed = gateway.access().check(writer.request().identity, object);
@@ -291,6 +273,16 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   if (target) {
     auto wanted = access_request(*target, verb_of(request, *target));
     if (!target->member && request.option("lease") == "renew") wanted.is_vital = true;
+    const auto lease = writer.request().header(lease_header);
+    const bool has_ended = !lease.empty() && !gateway.lease_holders().contains(lease);
+    // What was sent under a lease moves nothing once it has ended, though nobody else has one.
+    if (has_ended && !request.is_read() && !request.option("lease") && !wanted.is_vital) {
+      const auto ended =
+          rr::make_error(rr::ErrorCode::object_locked_error, "the lease of this Rrgate-Lease has ended: take it again");
+      const auto response = request.error_response(ended, nullptr);
+      co_await writer.send(response);
+      co_return;
+    }
     auto who = writer.request().identity;
     if (wanted.verb == Verb::subscribe) who.face = Face::stream;
     const auto event = lease_event(request, *target);
@@ -360,7 +352,9 @@ std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& r
   if (!segments || segments->size() < 2) return {};
   const bool gives_back = method == http::verb::post && shows_own_lease(gateway, request);
   const auto* device = segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
-  if (!gives_back && (!device || !is_urgent_member(*device, *segments))) return {};
+  std::string place = (*segments)[1];
+  for (std::size_t i = 2; i < segments->size(); ++i) place += "." + (*segments)[i];
+  if (!gives_back && (!device || !device->config().leases.is_urgent(place))) return {};
   return UrgentCommand{(*segments)[0], (*segments)[1]};
 }
 
