@@ -79,7 +79,7 @@ const JsonOperations::Operation* JsonOperations::find_operation(std::string_view
   return found == std::end(operations) ? nullptr : found;
 }
 
-JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox)
+JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<Outbox> outbox)
     : gateway_(gateway),
       place_(std::move(place)),
       outbox_(std::move(outbox)),

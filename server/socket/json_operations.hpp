@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "server/access/standing.hpp"
+#include "server/limits/outbox.hpp"
 #include "server/socket/json_members.hpp"
-#include "server/socket/json_outbox.hpp"
 #include "server/socket/json_questions.hpp"
 #include "server/state/http_access.hpp"
 
@@ -32,7 +32,7 @@ struct JsonSocketPlace {
 /// Lives in a shared_ptr, which the requests under way keep. For the gateway's thread.
 class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
  public:
-  JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox);
+  JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<Outbox> outbox);
 
   /// Begins what one message asks for, and waits for a login alone: what a device does not answer stops no message
   /// behind it, which may be to stop the device. Packets are sent one after the other.
@@ -75,15 +75,15 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   };
   struct Pending {};
   struct Open {
-    explicit Open(std::shared_ptr<JsonOutbox> outbox) : opening(std::move(outbox)) {}
+    explicit Open(std::shared_ptr<Outbox> outbox) : opening(std::move(outbox)) {}
 
-    JsonOpening opening;
+    OutboxOpening opening;
     std::variant<Pending, Subscription, Generator> what;
   };
   /// An id, and which of all that have it one after the other.
   struct Reserved {
     std::string id;
-    JsonOutbox::Token token = 0;
+    Outbox::Token token = 0;
   };
   struct Packet {
     JsonRequestPtr request;
@@ -138,7 +138,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   GatewayState& gateway_;
   JsonSocketPlace place_;
-  std::shared_ptr<JsonOutbox> outbox_;
+  std::shared_ptr<Outbox> outbox_;
   std::shared_ptr<ValueClient> own_;  ///< once something needs it; then everything uses it
   std::map<std::string, Open> open_;
   std::map<std::pair<std::string, std::string>, ValueClient::ListenerPtr> senders_;  ///< hold what is sent on

@@ -46,7 +46,7 @@ struct JsonQuestions::Question {
   rr::Deadline limit;
 };
 
-JsonQuestions::JsonQuestions(asio::any_io_executor executor, rr::JsonForm form, std::shared_ptr<JsonOutbox> outbox)
+JsonQuestions::JsonQuestions(asio::any_io_executor executor, rr::JsonForm form, std::shared_ptr<Outbox> outbox)
     : executor_(std::move(executor)), form_(form), outbox_(std::move(outbox)) {}
 
 void JsonQuestions::ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,

@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "server/limits/outbox.hpp"
 #include "server/socket/json_members.hpp"
-#include "server/socket/json_outbox.hpp"
 
 namespace rrgate {
 
@@ -23,7 +23,7 @@ class JsonQuestions {
  public:
   using Reply = rr::ClientConnection::CallbackReply;
 
-  JsonQuestions(boost::asio::any_io_executor executor, rr::JsonForm form, std::shared_ptr<JsonOutbox> outbox);
+  JsonQuestions(boost::asio::any_io_executor executor, rr::JsonForm form, std::shared_ptr<Outbox> outbox);
 
   /// Asks the client. `id`  of its request for the callback; `target`  the callback, without a client.
   /// Replies   also out_of_system_resource: too many wait; operation_timeout: it has not answered in time.
@@ -40,7 +40,7 @@ class JsonQuestions {
 
   boost::asio::any_io_executor executor_;
   rr::JsonForm form_;
-  std::shared_ptr<JsonOutbox> outbox_;
+  std::shared_ptr<Outbox> outbox_;
   std::map<std::int64_t, std::shared_ptr<Question>> waiting_;
   std::int64_t last_ = 0;
 };

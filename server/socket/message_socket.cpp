@@ -16,6 +16,8 @@ constexpr std::chrono::seconds ping_period{15};
 constexpr auto silence_limit = ping_period * 3;
 /// Of a message that comes in parts: so little is not worth an entry in the account of memory.
 constexpr std::size_t uncounted_bytes = 16 * 1024;
+constexpr const char* socket_too_slow = R"({"error":{"name":"RobotRaconteur.OutOfSystemResource",)"
+                                        R"("message":"too slow: messages were lost, so the connection ends"}})";
 
 }  // namespace
 
@@ -25,7 +27,7 @@ MessageSocket::MessageSocket(std::unique_ptr<rr::ByteStream> stream, std::size_t
       memory_(std::move(memory)),
       messages_(*stream_, max_message_bytes,
                 [this](std::size_t bytes) { return memory_.resize(bytes < uncounted_bytes ? 0 : bytes); }),
-      outbox_(std::make_shared<JsonOutbox>(stream_->executor(), memory_.sibling())),
+      outbox_(std::make_shared<Outbox>(stream_->executor(), memory_.sibling(), socket_too_slow)),
       written_(stream_->executor(), asio::steady_timer::time_point::max()) {}
 
 void MessageSocket::stop(rr::EndReason reason) {

@@ -8,7 +8,7 @@
 
 #include "node/transport/websocket_messages.hpp"
 #include "server/limits/memory_budget.hpp"
-#include "server/socket/json_outbox.hpp"
+#include "server/limits/outbox.hpp"
 
 namespace rrgate {
 
@@ -19,7 +19,7 @@ class MessageSocket : public std::enable_shared_from_this<MessageSocket> {
   MessageSocket(std::unique_ptr<rr::ByteStream> stream, std::size_t max_message_bytes, MemoryBudget::Charge memory);
 
   /// What is put in here is sent.
-  const std::shared_ptr<JsonOutbox>& outbox() const { return outbox_; }
+  const std::shared_ptr<Outbox>& outbox() const { return outbox_; }
   /// Hands each message to `take` until the socket ends. `stopped`  is called once, as soon as nothing more is to come.
   /// Returns  why it ended.
   rr::awaitable<std::string> run(std::function<rr::awaitable<void>(const std::string&)> take,
@@ -33,7 +33,7 @@ class MessageSocket : public std::enable_shared_from_this<MessageSocket> {
   std::unique_ptr<rr::ByteStream> stream_;
   MemoryBudget::Charge memory_;
   rr::WebSocketMessages messages_;
-  std::shared_ptr<JsonOutbox> outbox_;
+  std::shared_ptr<Outbox> outbox_;
   std::function<void()> stopped_;
   rr::EndReason reason_;
   bool is_over_ = false;

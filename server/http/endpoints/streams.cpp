@@ -2,13 +2,14 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <charconv>
-#include <deque>
+#include <optional>
 
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 #include "server/http/endpoints/sample_jpeg.hpp"
 #include "server/http/endpoints/sample_text.hpp"
+#include "server/limits/outbox.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -19,59 +20,8 @@ namespace {
 
 /// A stream without news for so long gets a comment: proxies and clients see that it lives.
 constexpr std::chrono::seconds comment_period{15};
-/// What may wait for a slow reader before it is told and closed.
-constexpr std::size_t max_waiting_bytes = 4u * 1024 * 1024;
-
-/// What goes out next, filled by handlers, emptied by the one coroutine that writes.
-struct Outbox {
-  Outbox(const asio::any_io_executor& executor, MemoryBudget::Charge its_memory)
-      : memory(std::move(its_memory)), news(executor) {}
-
-  void add(std::string text, bool replaces) {
-    if (is_over) return;
-    if (replaces && !waiting.empty() && is_replaceable) {
-      bytes -= waiting.back().size();
-      waiting.back() = std::move(text);
-      bytes += waiting.back().size();
-    } else {
-      bytes += text.size();
-      waiting.push_back(std::move(text));
-    }
-    is_replaceable = replaces;
-    // One alone may be larger: who keeps pace is not cut where others hold the memory.
-    const bool has_room = memory.resize(in_flight + bytes);
-    if (waiting.size() > 1 && (bytes > max_waiting_bytes || !has_room)) {
-      waiting.clear();
-      bytes = 0;
-      waiting.push_back("event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n");
-      is_over = true;
-    } else if (!has_room) {
-      memory.hold(in_flight + bytes);
-    }
-    news.cancel();
-  }
-
-  std::string take() {
-    std::string text;
-    for (const auto& each : waiting) text += each;
-    waiting.clear();
-    in_flight = std::exchange(bytes, 0);
-    return text;
-  }
-  void note_sent() {
-    in_flight = 0;
-    memory.hold(bytes);
-  }
-
-  MemoryBudget::Charge memory;
-  std::deque<std::string> waiting;
-  std::size_t bytes = 0;        ///< of those
-  std::size_t in_flight = 0;    ///< of what is being written
-  bool is_replaceable = false;  ///< the last one is a wire's value: a newer one takes its place
-  bool is_over = false;
-  bool is_gone = false;
-  asio::steady_timer news;
-};
+constexpr const char* stream_too_slow =
+    "event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n";
 
 std::string state_text(const rr::Error* error) {
   auto out = rr::OrderedJson::object();
@@ -80,8 +30,10 @@ std::string state_text(const rr::Error* error) {
   return "event: state\ndata: " + rr::write_json(out) + "\n\n";
 }
 
-std::string event_text(const std::string& json, std::uint64_t number, bool has_number) {
-  return (has_number ? "id: " + std::to_string(number) + "\n" : "") + "data: " + json + "\n\n";
+/// `number`  of an event, by which a client that comes again goes on; nullopt: it has none.
+std::string sample_event(const rr::Result<std::string>& json, std::optional<std::uint64_t> number) {
+  if (!json) return "event: error\ndata: " + rr::write_json(rr::error_to_json(json.error(), {})) + "\n\n";
+  return (number ? "id: " + std::to_string(*number) + "\n" : "") + "data: " + *json + "\n\n";
 }
 
 /// Streams are text, whatever else the client takes: arrays of numbers don't become the bytes of CBOR.
@@ -103,17 +55,22 @@ Response stream_head(std::string_view content_type) {
 rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& target) {
   auto& writer = request.writer();
   const auto& member = *target.member;
-  const auto outbox = std::make_shared<Outbox>(writer.executor(), writer.memory().sibling());
+  const auto outbox = std::make_shared<Outbox>(writer.executor(), writer.memory().sibling(), stream_too_slow);
+  const OutboxOpening opening(outbox);
   const bool is_wire = member.kind == rr::MemberKind::wire;
   const bool is_event = member.kind == rr::MemberKind::event;
-  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = text_form(request),
+  SampleHandler handler = [outbox, token = opening.token(), types = target.registry, &member, is_wire, is_event,
+                           form = text_form(request),
                            memory = &request.gateway().memory()](const SamplePtr& sample, const rr::Error* error) {
-    if (!sample) return outbox->add(state_text(error), false);
-    const auto& json = sample_text(*sample, member, *types, form, *memory);
-    if (json)
-      outbox->add(event_text(*json, sample->number, is_event), is_wire);
+    if (!sample) return outbox->add(token, state_text(error));
+    const auto number = is_event ? std::optional(sample->number) : std::nullopt;
+    auto text = [sample, types, &member, form, memory, number] {
+      return sample_event(sample_text(*sample, member, *types, form, *memory), number);
+    };
+    if (is_wire)
+      outbox->add_newest(token, sample->bytes, std::move(text));
     else
-      outbox->add("event: error\ndata: " + rr::write_json(rr::error_to_json(json.error(), {})) + "\n\n", false);
+      outbox->add(token, text());
   };
   std::uint64_t after = 0;
   const auto last_id = request.request().header("Last-Event-ID");
@@ -125,25 +82,27 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
 
   const auto head = stream_head("text/event-stream");
   if (co_await writer.begin(head) || !writer.has_body()) co_return;
-  writer.watch([outbox] {
-    outbox->is_gone = true;
-    outbox->news.cancel();
+  const auto is_gone = std::make_shared<bool>(false);
+  writer.watch([outbox, is_gone] {
+    *is_gone = true;
+    outbox->news().cancel();
   });
   // The first byte tells clients and proxies that the stream is there.
   auto failed = co_await writer.write(": connected\n\n");
-  while (!failed && !outbox->is_gone) {
-    if (outbox->waiting.empty()) {
-      if (outbox->is_over) break;
-      outbox->news.expires_after(comment_period);
-      const auto [cancelled] = co_await outbox->news.async_wait(asio::as_tuple(asio::use_awaitable));
-      if (!cancelled && outbox->waiting.empty()) failed = co_await writer.write(": \n\n");
+  while (!failed && !*is_gone) {
+    if (outbox->is_empty()) {
+      if (outbox->has_overflown()) break;
+      outbox->news().expires_after(comment_period);
+      const auto [cancelled] = co_await outbox->news().async_wait(asio::as_tuple(asio::use_awaitable));
+      if (!cancelled && outbox->is_empty()) failed = co_await writer.write(": \n\n");
       continue;
     }
-    const auto text = outbox->take();
-    failed = co_await writer.write(text);
+    const auto texts = outbox->take();
+    const std::vector<std::string_view> parts(texts.begin(), texts.end());
+    failed = co_await writer.write(parts);
     outbox->note_sent();
   }
-  if (!failed && !outbox->is_gone) co_await writer.end();
+  if (!failed && !*is_gone) co_await writer.end();
   co_await writer.unwatch();
 }
 

@@ -1,4 +1,4 @@
-// What waits to be sent on a WebSocket of JSON messages. Layer: server/socket.
+// What waits to be sent to a client of a WebSocket of JSON messages, or of an event stream. Layer: server/limits.
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
@@ -16,14 +16,14 @@ namespace rrgate {
 
 /// Filled by whoever has something to tell, emptied by the one coroutine that writes. Nothing is lost, except that of a
 /// wire's values only the newest waits. For the thread of the executor.
-class JsonOutbox {
+class Outbox {
  public:
   /// Names what a client has opened, whatever else has had its id before, or has it later.
   using Token = std::uint64_t;
 
-  /// `memory`  is where what waits is counted.
-  JsonOutbox(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory)
-      : memory_(std::move(memory)), news_(executor) {}
+  /// `memory`  is where what waits is counted. `too_slow`  the last message of one that has overflown.
+  Outbox(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory, std::string too_slow)
+      : memory_(std::move(memory)), too_slow_(std::move(too_slow)), news_(executor) {}
 
   /// What is opened may have messages, until forget().
   Token begin();
@@ -62,6 +62,7 @@ class JsonOutbox {
   void count();
 
   MemoryBudget::Charge memory_;
+  std::string too_slow_;
   Entries waiting_;
   std::map<Token, Entries::iterator> opened_;  ///< and where the newest value waits; the end: none does
   Token last_token_ = 0;
@@ -74,18 +75,18 @@ class JsonOutbox {
 };
 
 /// What a client has opened at an outbox, for as long as this lives.
-class JsonOpening {
+class OutboxOpening {
  public:
-  explicit JsonOpening(std::shared_ptr<JsonOutbox> outbox) : outbox_(std::move(outbox)), token_(outbox_->begin()) {}
-  ~JsonOpening() { outbox_->forget(token_); }
-  JsonOpening(const JsonOpening&) = delete;
-  JsonOpening& operator=(const JsonOpening&) = delete;
+  explicit OutboxOpening(std::shared_ptr<Outbox> outbox) : outbox_(std::move(outbox)), token_(outbox_->begin()) {}
+  ~OutboxOpening() { outbox_->forget(token_); }
+  OutboxOpening(const OutboxOpening&) = delete;
+  OutboxOpening& operator=(const OutboxOpening&) = delete;
 
-  JsonOutbox::Token token() const { return token_; }
+  Outbox::Token token() const { return token_; }
 
  private:
-  std::shared_ptr<JsonOutbox> outbox_;
-  JsonOutbox::Token token_;
+  std::shared_ptr<Outbox> outbox_;
+  Outbox::Token token_;
 };
 
 }  // namespace rrgate

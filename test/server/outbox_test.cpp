@@ -1,5 +1,5 @@
 // What waits for a slow client of a JSON WebSocket, as subscriptions begin, end and use ids again.
-#include "server/socket/json_outbox.hpp"
+#include "server/limits/outbox.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
@@ -12,9 +12,9 @@ namespace {
 struct Waiting {
   boost::asio::io_context io;
   MemoryBudget budget{1'000'000};
-  std::shared_ptr<JsonOutbox> outbox = std::make_shared<JsonOutbox>(io.get_executor(), budget.charge("one"));
+  std::shared_ptr<Outbox> outbox = std::make_shared<Outbox>(io.get_executor(), budget.charge("one"), "too slow");
 
-  void add_newest(const JsonOpening& opening, std::string text, std::size_t bytes = 0) {
+  void add_newest(const OutboxOpening& opening, std::string text, std::size_t bytes = 0) {
     outbox->add_newest(opening.token(), bytes, [text = std::move(text)] { return text; });
   }
 };
@@ -25,7 +25,7 @@ TEST_CASE("subscriptions that begin and end leave no value behind for a client t
   Waiting w;
   const auto value = std::make_shared<const int>(1);
   for (int i = 0; i < 1000; ++i) {
-    const JsonOpening opening(w.outbox);
+    const OutboxOpening opening(w.outbox);
     w.outbox->add_newest(opening.token(), 100, [value] { return std::to_string(*value); });
     CHECK(w.budget.used() == 100);
   }
@@ -36,7 +36,7 @@ TEST_CASE("subscriptions that begin and end leave no value behind for a client t
 
 TEST_CASE("what a waiting value keeps is counted until it is sent") {
   Waiting w;
-  const JsonOpening opening(w.outbox);
+  const OutboxOpening opening(w.outbox);
   w.add_newest(opening, "first", 5000);
   CHECK(w.budget.used() == 5000);
   w.add_newest(opening, "second", 300);
@@ -52,12 +52,12 @@ TEST_CASE("what a waiting value keeps is counted until it is sent") {
 
 TEST_CASE("a value of a new subscription takes no place of one that had its id before") {
   Waiting w;
-  auto first = std::make_unique<JsonOpening>(w.outbox);
+  auto first = std::make_unique<OutboxOpening>(w.outbox);
   w.add_newest(*first, "of the first");
   const auto ended = first->token();
   first.reset();
   w.outbox->add("both answers");
-  const JsonOpening second(w.outbox);
+  const OutboxOpening second(w.outbox);
   CHECK(second.token() != ended);
   w.add_newest(second, "of the second");
   w.outbox->add_newest(ended, 0, [] { return "too late"; });
@@ -67,8 +67,8 @@ TEST_CASE("a value of a new subscription takes no place of one that had its id b
 
 TEST_CASE("a value that comes after an outage is sent after the news of it") {
   Waiting w;
-  const JsonOpening opening(w.outbox);
-  const JsonOpening other(w.outbox);
+  const OutboxOpening opening(w.outbox);
+  const OutboxOpening other(w.outbox);
   w.add_newest(opening, "before");
   w.add_newest(other, "of another wire");
   w.outbox->add(opening.token(), "lost");
@@ -81,7 +81,7 @@ TEST_CASE("a value that comes after an outage is sent after the news of it") {
 
 TEST_CASE("a client that is too slow has one message left, whatever else waits") {
   Waiting w;
-  const JsonOpening opening(w.outbox);
+  const OutboxOpening opening(w.outbox);
   w.add_newest(opening, "value", 10);
   w.outbox->add(std::string(900'000, 'x'));
   CHECK(w.outbox->has_overflown());

@@ -1,4 +1,4 @@
-#include "server/socket/json_outbox.hpp"
+#include "server/limits/outbox.hpp"
 
 #include <utility>
 
@@ -14,18 +14,18 @@ constexpr std::size_t write_bytes = 64u * 1024;
 
 }  // namespace
 
-JsonOutbox::Token JsonOutbox::begin() {
+Outbox::Token Outbox::begin() {
   opened_[++last_token_] = waiting_.end();
   return last_token_;
 }
 
-void JsonOutbox::forget(Token of) {
+void Outbox::forget(Token of) {
   drop_newest(of);
   opened_.erase(of);
   count();
 }
 
-void JsonOutbox::add(std::string text) {
+void Outbox::add(std::string text) {
   if (is_closed_) return;
   const auto bytes = bytes_ + text.size();
   const bool is_full = bytes > max_outbox_bytes || waiting_.size() >= max_waiting_messages ||
@@ -33,8 +33,7 @@ void JsonOutbox::add(std::string text) {
   if (is_full && !waiting_.empty()) {
     clear();
     has_overflown_ = is_closed_ = true;
-    text = R"({"error":{"name":"RobotRaconteur.OutOfSystemResource",)"
-           R"("message":"too slow: messages were lost, so the connection ends"}})";
+    text = std::move(too_slow_);
   }
   bytes_ += text.size();
   count();
@@ -42,13 +41,13 @@ void JsonOutbox::add(std::string text) {
   news_.cancel();
 }
 
-void JsonOutbox::add(Token of, std::string text) {
+void Outbox::add(Token of, std::string text) {
   if (!opened_.contains(of)) return;
   drop_newest(of);
   add(std::move(text));
 }
 
-void JsonOutbox::add_newest(Token of, std::size_t bytes, std::function<std::string()> text) {
+void Outbox::add_newest(Token of, std::size_t bytes, std::function<std::string()> text) {
   const auto opened = opened_.find(of);
   if (is_closed_ || opened == opened_.end()) return;
   auto& at = opened->second;
@@ -60,32 +59,32 @@ void JsonOutbox::add_newest(Token of, std::size_t bytes, std::function<std::stri
   if (is_new) news_.cancel();
 }
 
-void JsonOutbox::drop_newest(Token of) {
+void Outbox::drop_newest(Token of) {
   const auto opened = opened_.find(of);
   if (opened == opened_.end() || opened->second == waiting_.end()) return;
   kept_bytes_ -= opened->second->kept_bytes;
   waiting_.erase(std::exchange(opened->second, waiting_.end()));
 }
 
-void JsonOutbox::clear() {
+void Outbox::clear() {
   for (auto& [token, at] : opened_) at = waiting_.end();
   waiting_.clear();
   bytes_ = kept_bytes_ = 0;
 }
 
 /// In any case: it is there already.
-void JsonOutbox::count() {
+void Outbox::count() {
   memory_.hold(in_flight_ + kept_bytes_ + bytes_);
 }
 
-void JsonOutbox::close() {
+void Outbox::close() {
   is_closed_ = true;
   clear();
   count();
   news_.cancel();
 }
 
-std::vector<std::string> JsonOutbox::take() {
+std::vector<std::string> Outbox::take() {
   std::vector<std::string> out;
   std::size_t taken = 0;
   while (!waiting_.empty() && taken < write_bytes) {
@@ -106,7 +105,7 @@ std::vector<std::string> JsonOutbox::take() {
   return out;
 }
 
-void JsonOutbox::note_sent() {
+void Outbox::note_sent() {
   in_flight_ = 0;
   count();
 }
