@@ -175,6 +175,20 @@ TEST_CASE("a response renews a cookie when half its time is over, unless it sets
   CHECK(who_has(renewed[0]).is_null());
 }
 
+TEST_CASE("whoever signs in takes the place of who was signed in: no late response renews the former cookie") {
+  Guarded guarded;
+  const auto former = guarded.old_cookie();
+  TestClient late(guarded.gateway.port());
+  late.send("POST /api/v1/session HTTP/1.1\r\nHost: localhost:8080\r\nConnection: close\r\nContent-Length: 8\r\n" +
+            std::string("Expect: 100-continue\r\n") + own_page + former + "\r\n");
+  late.receive_until("HTTP/1.1 100 Continue\r\n\r\n");
+  CHECK(guarded.sign_in(R"({"token": ")" + guarded.token_of_bob + "\"}", former + own_page).status == 201);
+  late.send("no JSON!");
+  CHECK_THAT(late.receive_all(), !Catch::Contains("Set-Cookie"));
+  CHECK_THAT(guarded.ask("GET /api/v1/access", former).head, !Catch::Contains("Set-Cookie"));
+  CHECK(guarded.who(former).is_null());
+}
+
 TEST_CASE("a sign-in ends when what was shown is good no more") {
   Guarded guarded;
   const auto cookie = guarded.cookie();

@@ -134,6 +134,10 @@ rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& requ
   const auto now = Clock::now();
   const auto cookie = gateway.access().sign_ins().begin(who, now);
   if (!cookie) co_return problem_response(409, "you have more roles than a cookie can name");
+  // Else a late response to a request of the former user could renew his cookie over this one.
+  if (const auto former = gateway.access().sign_ins().find(sign_in_cookie(request), now))
+    if (!gateway.access().sign_out(*former))
+      co_return problem_response(503, "too many have signed out; try again later");
   gateway.access().record({.event = "signed_in", .who = &who});
   const auto left = std::min(Clock::duration(SignIns::lifetime), who.ends - now);
   auto response = json_answer(201, {{"user", who.name},
