@@ -146,6 +146,11 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::
   co_return stream;
 }
 
+void Device::share(const std::string& service, std::weak_ptr<Upstream> by) {
+  std::erase_if(shared_, [](const auto& known) { return known.second.expired(); });  // devices choose the names
+  shared_[service] = std::move(by);
+}
+
 rr::Result<std::shared_ptr<Upstream>> Device::find_shared(const std::string& service) const {
   const auto found = shared_.find(service);
   if (found != shared_.end())

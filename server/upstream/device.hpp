@@ -67,7 +67,7 @@ class Device : public std::enable_shared_from_this<Device> {
   /// Such a look has come. Until one is answered no client is connected, or each would go round in circles.
   void note_circle();
   /// The session that all clients of a service share, as long as it lives.
-  void share(const std::string& service, std::weak_ptr<Upstream> by) { shared_[service] = std::move(by); }
+  void share(const std::string& service, std::weak_ptr<Upstream> by);
   /// Errors   service_not_found; connection_error: the device has not answered yet.
   rr::Result<std::shared_ptr<Upstream>> find_shared(const std::string& service) const;
   const Retry& retry() const { return retry_; }
