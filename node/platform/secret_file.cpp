@@ -1,8 +1,9 @@
 #include "node/platform/secret_file.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "node/platform/replace_file.hpp"
 
 namespace rr {
 
@@ -53,20 +54,8 @@ Result<> write_secret(const fs::path& path, std::string_view text, bool may_repl
                     : Keeper{.mode = S_IRUSR | S_IWUSR};
   if (struct stat before{}; ::stat(path.c_str(), &before) == 0)
     keeper = {before.st_uid, before.st_gid, S_IRUSR | S_IWUSR | (before.st_mode & S_IRGRP)};
-  const auto fresh = path.string() + ".new";
-  ::unlink(fresh.c_str());
-  const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  bool is_written = file >= 0;
-  if (is_written) {
-    is_written = give_away(file, keeper) &&
-                 ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(file) == 0;
-    ::close(file);
-  }
-  if (is_written) is_written = ::rename(fresh.c_str(), path.c_str()) == 0;
-  if (!is_written) {
-    ::unlink(fresh.c_str());
+  if (!replace_file(path, text, [&keeper](int file) { return give_away(file, keeper); }))
     return make_error(ErrorCode::io_error, path.string() + ": can't be written");
-  }
   return {};
 }
 

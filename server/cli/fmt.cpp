@@ -3,9 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "core/robdef/format/format_source.hpp"
+#include "node/platform/replace_file.hpp"
 #include "server/cli/definition_options.hpp"
 
 namespace rrgate {
@@ -18,31 +18,16 @@ struct FormatOptions : DefinitionOptions {
   bool is_json = false;
 };
 
-bool write_whole(int file, std::string_view text) {
-  while (!text.empty()) {
-    const auto written = ::write(file, text.data(), text.size());
-    if (written <= 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return ::fsync(file) == 0;
-}
-
-/// The file is there whole all the time: what it was, or what it is to be. It keeps its mode, and where
-/// root writes its owner. False: it could not be written, and is what it was.
-bool replace_file(const std::string& path, std::string_view text) {
+/// It keeps its mode, and where root writes its owner. False: it could not be written, and is what it was.
+bool replace_definition(const std::string& path, std::string_view text) {
   std::error_code error;
-  const auto target = std::filesystem::canonical(path, error).string();  // a link stays one
+  const auto target = std::filesystem::canonical(path, error);  // a link stays one
   struct stat before {};
   if (error || ::access(target.c_str(), W_OK) != 0 || ::stat(target.c_str(), &before) != 0) return false;
-  auto fresh = target + ".XXXXXX";
-  const int file = ::mkstemp(fresh.data());
-  if (file < 0) return false;
-  const bool is_given = ::fchown(file, before.st_uid, before.st_gid) == 0 || ::geteuid() != 0;
-  const bool is_complete = is_given && ::fchmod(file, before.st_mode & 0777u) == 0 && write_whole(file, text);
-  ::close(file);
-  if (is_complete && ::rename(fresh.c_str(), target.c_str()) == 0) return true;
-  ::unlink(fresh.c_str());
-  return false;
+  return rr::replace_file(target, text, [&before](int file) {
+    const bool is_given = ::fchown(file, before.st_uid, before.st_gid) == 0 || ::geteuid() != 0;
+    return is_given && ::fchmod(file, before.st_mode & 0777u) == 0;
+  });
 }
 
 int format_definition(const FormatOptions& options, const std::string& file, const rr::ParseResult& source) {
@@ -73,7 +58,7 @@ int format_definition(const FormatOptions& options, const std::string& file, con
     return exit_ok;
   }
   const auto formatted = rr::format_source(source.definition);
-  if (formatted != text && !replace_file(file, formatted)) {
+  if (formatted != text && !replace_definition(file, formatted)) {
     std::cerr << file << ": error: cannot be written\n";
     return exit_failed;
   }

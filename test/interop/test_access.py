@@ -348,6 +348,8 @@ def test_passwd_and_token(tmp_path):
     users, tokens = tmp_path / "secret" / "users", tmp_path / "secret" / "tokens"
     assert "added" in rrgate("passwd", users, "alice", "--roles", "a,b", given="one\n")
     assert users.stat().st_mode & 0o777 == 0o600 and users.parent.stat().st_mode & 0o777 == 0o700
+    beside = users.with_suffix(".new")
+    beside.write_text("somebody's own")
     first = users.read_text()
     assert first.startswith("alice $scrypt$ln=") and first.endswith(" a,b\n")
     rrgate("passwd", users, "bob", given="two\n")
@@ -356,6 +358,7 @@ def test_passwd_and_token(tmp_path):
     assert alice.endswith(" a,b") and not first.startswith(alice) and bob.startswith("bob ") and bob.endswith(" _")
     assert "deleted" in rrgate("passwd", users, "alice", "--delete")
     assert users.read_text() == bob + "\n"
+    assert beside.read_text() == "somebody's own" and set(users.parent.iterdir()) == {users, beside}
     token = rrgate("token", tokens, "ci", "--roles", "a", "--days", 1)
     assert token.startswith("rrg_") and token not in tokens.read_text()
     rrgate("token", tokens, "ci", "--delete")

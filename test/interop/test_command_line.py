@@ -9,7 +9,6 @@ import os
 import pathlib
 import re
 import select
-import shutil
 import socket
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UN
 from directions import PEERS
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway, running
+from machine import need
 from processes import BUILD, Background, free_port
 from shared_sites import Site, start_service
 from tap import Tap
@@ -615,13 +615,16 @@ def test_services_of_a_type_are_listed(tmp_path):
 
 
 def test_a_folder_that_init_could_not_finish_is_begun_anew(tmp_path):
+    need("mount-namespaces")
     folder = tmp_path / "lab"
-    (folder / "gateway.json.new").mkdir(parents=True)  # so that the configuration, which comes last, can't be written
-    (folder / "gateway.json.new" / "x").write_text("")
-    failed = Ran(["init", folder])
-    assert failed.code == FAILED and failed.error == f"rrgate init: {folder}/gateway.json: can't be written\n"
-    assert [each.name for each in folder.iterdir()] == ["gateway.json.new"]
-    shutil.rmtree(folder / "gateway.json.new")
+    folder.mkdir()
+    file = folder / "gateway.json"
+    file.write_text('{"listen": ["127.0.0.1:8080"], "devices": []}')
+    script = 'mount --bind "$1" "$1" && shift && exec "$@"'  # the configuration, which comes last, can't be replaced
+    failed = subprocess.run(["unshare", "-m", "--propagation", "private", "sh", "-c", script, "sh", file, RRGATE, "init", folder],
+                            capture_output=True, text=True, timeout=60)
+    assert failed.returncode == FAILED and failed.stderr == f"rrgate init: {file}: can't be written\n"
+    assert list(folder.iterdir()) == [file]
     assert "user admin" in run("init", folder)
     assert {"gateway.json", "tls", "users", "tickets.key"} <= {each.name for each in folder.iterdir()}
     (folder / "gateway.json").unlink()
