@@ -14,6 +14,7 @@ struct Boarding {
   Device& device;
   Device::Seat seat;
   std::unique_ptr<rr::ByteStream> stream;
+  std::shared_ptr<const void> session = device.begin_session();
 };
 
 /// Whether a client's bytes may pass to a device unread: only where he could do everything to it.

@@ -142,7 +142,8 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::
   auto dialed = rr::dial_any(urls_to_try(), dial_options(way));
   auto stream = co_await until_stopped(std::move(dialed));
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
-  if (stream.has_value() != (state_ == DeviceState::online)) look_again();
+  const bool was_online = state_ == DeviceState::online;
+  if (stream ? !was_online : was_online && sessions_ == 0) look_again();
   co_return stream;
 }
 
@@ -201,6 +202,14 @@ std::optional<Device::Seat> Device::take_seat() {
   return Seat(*this);
 }
 
+std::shared_ptr<const void> Device::begin_session() {
+  ++sessions_;
+  return {this, [self = shared_from_this()](const void*) {
+            // Not at once: a small device needs a moment until it has room again.
+            if (--self->sessions_ == 0 && self->waits_for_end_) self->wake_.expires_after(self->retry_.min);
+          }};
+}
+
 std::shared_ptr<const void> Device::begin_closing() {
   ++closing_;
   return {this, [self = shared_from_this()](const void*) { --self->closing_; }};
@@ -237,10 +246,16 @@ rr::awaitable<void> Device::watch() {
     }
     is_circle_ = has_come_back_ && !result;
     if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);
+    // It has no room for another connection: the session that is open tells when it has gone.
+    waits_for_end_ = !result && sessions_ > 0 && identity_;
+    if (waits_for_end_) result = *identity_;
     note(result);
     if (result) backoff_.reset();
     const auto looked = std::chrono::steady_clock::now();
-    wake_.expires_at(looked + (result ? around(retry_.online) : backoff_.next()));
+    if (waits_for_end_)
+      wake_.expires_at(asio::steady_timer::time_point::max());
+    else
+      wake_.expires_at(looked + (result ? around(retry_.online) : backoff_.next()));
     while (!is_stopping_) {
       // Looking again on demand keeps the shortest wait too, or a crowd of clients would make this loop spin.
       if (looks_again_) wake_.expires_at(std::min(wake_.expiry(), looked + retry_.min));

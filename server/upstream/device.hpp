@@ -106,6 +106,9 @@ class Device : public std::enable_shared_from_this<Device> {
   bool is_full() const { return config_.max_clients != 0 && clients_ >= config_.max_clients; }
   /// nullopt when it is.
   std::optional<Seat> take_seat();
+  /// Held while a session with the device is open, whoever's: as long as there is one the device is there, though it
+  /// may have no room for the connection of a look.
+  std::shared_ptr<const void> begin_session();
   /// Held for a session that this side ends, until the device knows of it, with all that it was sent before: a gateway
   /// that stops waits for that.
   std::shared_ptr<const void> begin_closing();
@@ -162,10 +165,12 @@ class Device : public std::enable_shared_from_this<Device> {
   std::set<std::shared_ptr<ServiceLocks>> owing_;
   std::map<std::string, std::weak_ptr<Upstream>> shared_;  ///< likewise
   std::size_t clients_ = 0;
+  std::size_t sessions_ = 0;
   std::size_t closing_ = 0;
   Traffic traffic_;
   bool is_stopping_ = false;
   bool looks_again_ = false;
+  bool waits_for_end_ = false;  ///< of the last session, before it looks again
   boost::asio::steady_timer wake_;
 };
 

@@ -74,10 +74,11 @@ rr::awaitable<rr::Result<>> Upstream::open() {
     co_return rr::make_error(rr::ErrorCode::connection_error, "the session is not wanted any more");
   }
   connection_ = std::move(*opened);
-  connection_->on_closed([weak = weak_from_this(), which = connection_.get()](const rr::Error& reason) {
-    const auto still_there = weak.lock();
-    if (still_there && still_there->connection_.get() == which) still_there->lost(reason);
-  });
+  connection_->on_closed(
+      [weak = weak_from_this(), which = connection_.get(), in_use = device_->begin_session()](const rr::Error& reason) {
+        const auto still_there = weak.lock();
+        if (still_there && still_there->connection_.get() == which) still_there->lost(reason);
+      });
   connection_->on_path_released([weak = weak_from_this()](const std::string& path) {
     if (const auto still_there = weak.lock()) still_there->handle_released(path);
   });
