@@ -31,7 +31,7 @@ struct Announcement {
 struct PacketSource {
   IpAddress address;
   std::string zone = {};         ///< of a link-local IPv6 address, as this machine names it: "eth0" or "4"
-  bool is_this_machine = false;  ///< one of this machine's own addresses
+  bool is_this_machine = false;  ///< for certain: others can't send such a datagram
 };
 
 /// The packet's text, at most 2048 bytes: without the nonce where it would be longer.

@@ -1,9 +1,13 @@
 #include "node/discovery/ip_discovery.hpp"
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <boost/asio/ip/multicast.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <chrono>
+#include <cstring>
 #include <optional>
 
 #include "node/transport/byte_stream.hpp"
@@ -25,6 +29,15 @@ asio::ip::address_v6 group(std::uint8_t scope, unsigned zone) {
   bytes[14] = 0xba;
   bytes[15] = 0x86;
   return asio::ip::address_v6(bytes, zone);
+}
+
+/// Where a datagram went, as IPV6_RECVPKTINFO tells; any where it does not.
+asio::ip::address_v6 target_of(msghdr& message) {
+  asio::ip::address_v6::bytes_type bytes{};
+  for (auto* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part))
+    if (part->cmsg_level == IPPROTO_IPV6 && part->cmsg_type == IPV6_PKTINFO)
+      std::memcpy(bytes.data(), CMSG_DATA(part) + offsetof(in6_pktinfo, ipi6_addr), bytes.size());
+  return asio::ip::address_v6(bytes);
 }
 
 std::vector<std::uint8_t> group_scopes(const IpDiscoveryScopes& scopes) {
@@ -83,11 +96,12 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
   }
 
  private:
-  /// One socket that listens, with the buffer of the datagram that it waits for.
+  /// One socket that listens, with the datagram that it received last.
   struct Receiver {
     explicit Receiver(const asio::any_io_executor& executor) : socket(executor) {}
     udp::socket socket;
     udp::endpoint sender;
+    asio::ip::address_v6 target;  ///< of IPv6; else any
     std::array<char, max_discovery_packet_bytes> buffer{};
     std::set<unsigned> joined;  ///< interfaces whose groups it is a member of
   };
@@ -126,7 +140,12 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
     auto opened = std::make_shared<Receiver>(executor_);
     error_code error;
     opened->socket.open(endpoint.protocol(), error);
-    if (!error && endpoint.address().is_v6()) opened->socket.set_option(asio::ip::v6_only(true), error);
+    if (!error && endpoint.address().is_v6()) {
+      opened->socket.set_option(asio::ip::v6_only(true), error);
+      const int on = 1;
+      if (!error && ::setsockopt(opened->socket.native_handle(), IPPROTO_IPV6, IPV6_RECVPKTINFO, &on, sizeof(on)) != 0)
+        error.assign(errno, asio::error::get_system_category());
+    }
     // Every node of the machine listens at this port; multicast and broadcast datagrams reach all of them.
     if (!error) opened->socket.set_option(udp::socket::reuse_address(true), error);
     if (!error) opened->socket.bind(endpoint, error);
@@ -152,14 +171,36 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
   }
 
   void receive(const std::shared_ptr<Receiver>& receiver) {
-    receiver->socket.async_receive_from(
-        asio::buffer(receiver->buffer), receiver->sender,
-        [self = shared_from_this(), receiver](const error_code& error, std::size_t size) {
-          if (self->is_closed_ || error == asio::error::operation_aborted) return;
-          if (error) return self->drop(receiver, error);
-          self->handle_datagram(receiver->sender, std::string_view(receiver->buffer.data(), size));
-          if (!self->is_closed_) self->receive(receiver);
-        });
+    receiver->socket.async_wait(udp::socket::wait_read,
+                                [self = shared_from_this(), receiver](const error_code& waited) {
+                                  if (self->is_closed_ || waited == asio::error::operation_aborted) return;
+                                  error_code error = waited;
+                                  const auto packet = error ? std::nullopt : take_datagram(*receiver, error);
+                                  if (error) return self->drop(receiver, error);
+                                  if (packet) self->handle_datagram(*receiver, *packet);
+                                  if (!self->is_closed_) self->receive(receiver);
+                                });
+  }
+
+  /// By hand, for Asio does not tell which address a datagram went to. None: there is none after all.
+  static std::optional<std::string_view> take_datagram(Receiver& receiver, error_code& error) {
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(in6_pktinfo))> control{};
+    iovec into{receiver.buffer.data(), receiver.buffer.size()};
+    msghdr message{};
+    message.msg_name = receiver.sender.data();
+    message.msg_namelen = static_cast<socklen_t>(receiver.sender.capacity());
+    message.msg_iov = &into;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const auto size = ::recvmsg(receiver.socket.native_handle(), &message, MSG_DONTWAIT);
+    if (size < 0) {
+      if (errno != EAGAIN && errno != EINTR) error.assign(errno, asio::error::get_system_category());
+      return std::nullopt;
+    }
+    receiver.sender.resize(message.msg_namelen);
+    receiver.target = target_of(message);
+    return std::string_view(receiver.buffer.data(), static_cast<std::size_t>(size));
   }
 
   /// The next rescan opens another.
@@ -169,13 +210,21 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
       if (*each == receiver) each->reset();
   }
 
-  void handle_datagram(const udp::endpoint& sender, std::string_view packet) {
+  void handle_datagram(const Receiver& receiver, std::string_view packet) {
+    const auto sender = receiver.sender.address();
     PacketSource source;
-    source.address = to_ip_address(sender.address());
-    if (sender.address().is_v6()) source.zone = zone_of(sender.address().to_v6().scope_id());
-    source.is_this_machine = std::any_of(addresses_.begin(), addresses_.end(),
-                                         [&](const auto& own) { return to_ip_address(own.address) == source.address; });
+    source.address = to_ip_address(sender);
+    if (sender.is_v6()) source.zone = zone_of(sender.to_v6().scope_id());
+    source.is_this_machine = is_this_machine(receiver);
     callbacks_.received(packet, source);
+  }
+
+  /// Linux drops IPv4 packets from elsewhere that claim an address of ours, but lets those of IPv6 in. It drops what
+  /// came over a link to a group of scope 1.
+  bool is_this_machine(const Receiver& receiver) const {
+    if (receiver.sender.address().is_v6()) return receiver.target.is_multicast_node_local();
+    return std::any_of(addresses_.begin(), addresses_.end(),
+                       [&](const auto& own) { return own.address == receiver.sender.address(); });
   }
 
   void rescan_later() {

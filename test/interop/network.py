@@ -70,6 +70,10 @@ class Network:
         with concurrent.futures.ThreadPoolExecutor(1) as thread:
             return thread.submit(enter_and_call).result()
 
+    def link_local(self, host):
+        """Its IPv6 address on the link, without the zone."""
+        return self._ip("-n", self._names[host + 1], "-6", "-o", "addr", "show", "dev", "eth0", "scope", "link").split()[3].split("/")[0]
+
     def pull_cable(self, host):
         self._ip("-n", self._names[host + 1], "link", "set", "eth0", "down")
 

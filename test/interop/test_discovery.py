@@ -1,6 +1,8 @@
 """Nodes that find one another over IPv6 link-local multicast: ours and the reference's, each on a machine of its own."""
 import json
 import os
+import socket
+import struct
 import time
 
 import pytest
@@ -10,6 +12,8 @@ from network import Network, run
 from processes import BUILD, Background
 
 REFERENCE_DEADLINE = 20.0  # seconds: it looks at a node that it has heard of when its own time has come
+PORT = 48653  # of discovery
+GROUPS = ("ff01::ba86", "ff02::ba86")
 IDS = [f"1111111{number}-0000-4000-8000-000000000000" for number in range(8)]
 
 
@@ -206,6 +210,44 @@ def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_p
     theirs.process.wait()
     serve(start, "theirs", 1, "lab.theirs", IDS[6], 50002)
     ask("devices", lambda answer: any(":50002/" in device["url"] and device["state"] == "online" for device in answer["devices"]))
+
+
+def announcement(node_id, host, port):
+    return (f"Robot Raconteur Node Discovery Packet\n{{{node_id}}},a.node\n"
+            f"rr+tcp://{host}:{port}/?nodeid={node_id}&service=RobotRaconteurServiceIndex\n").encode()
+
+
+def say_to_group(group, text):
+    """Sends the packet from the address of the host on which it is called."""
+    with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as sender:
+        sender.sendto(text, (group, PORT, 0, socket.if_nametoindex("eth0")))
+
+
+def forge(source, group, text):
+    """The same, as if from another address: UDP over IPv6 by hand."""
+    ends = socket.inet_pton(socket.AF_INET6, source) + socket.inet_pton(socket.AF_INET6, group)
+    size = 8 + len(text)
+    summed = ends + struct.pack("!II4H", size, socket.IPPROTO_UDP, PORT, PORT, size, 0) + text + b"\0" * (len(text) % 2)
+    total = sum(struct.unpack(f"!{len(summed) // 2}H", summed))
+    while total > 0xFFFF:
+        total = (total & 0xFFFF) + (total >> 16)
+    packet = struct.pack("!IHBB", 6 << 28, size, socket.IPPROTO_UDP, 1) + ends
+    packet += struct.pack("!4H", PORT, PORT, size, total ^ 0xFFFF) + text
+    with socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(packet, ("eth0", 0x86DD, 0, 0, b"\x33\x33\0\0\xba\x86"))
+
+
+def test_a_loopback_address_is_taken_from_nobody_else_on_the_link(network, start):
+    watch = Watch(start(0, OURS, "watch", "all"))
+    for group in GROUPS:
+        for host in ("127.0.0.1", "[::1]"):
+            network.call(1, lambda: forge(network.link_local(0), group, announcement(IDS[0], host, 9999)))
+    # Packets come in the order in which they were sent.
+    network.call(1, lambda: say_to_group("ff02::ba86", announcement(IDS[1], f"[{network.link_local(1)}]", 9998)))
+    network.call(0, lambda: say_to_group("ff01::ba86", announcement(IDS[2], "127.0.0.1", 9997)))
+    heard = set()
+    watch.wait_for(lambda event: heard.add(event["id"]) or {IDS[1], IDS[2]} <= heard)
+    assert IDS[0] not in heard
 
 
 def test_localhost_is_served_by_a_machine_without_ipv6(network, start, tmp_path):

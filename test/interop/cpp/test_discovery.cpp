@@ -4,7 +4,7 @@
 //   rr-test-discovery serve NAME NODEID [PORT [ipv4]]  a node with the service "thing" of experimental.found.Thing;
 //   every line
 //                                                of input adds another service
-//   rr-test-discovery watch [ipv4]               nodes that come, change and go
+//   rr-test-discovery watch [ipv4|all]           nodes that come, change and go
 //   rr-test-discovery subscribe URL... | subscribe-type TYPE...   connections that come, with what their property "one"
 //   is, and
 //                                                go
@@ -80,10 +80,11 @@ struct Input {
   boost::asio::streambuf buffer_;
 };
 
-/// IPv6 link-local, or IPv4 broadcast alone, or nothing but this machine.
+/// IPv6 link-local, or IPv4 broadcast alone, or both and the packets of this machine alone, or no packets.
 rr::DiscoveryOptions options_for(std::string_view ip) {
   rr::DiscoveryOptions options;
   if (ip == "ipv4") options.ip = rr::IpDiscoveryScopes{.link_local = false, .ipv4_broadcast = true};
+  if (ip == "all") options.ip = rr::IpDiscoveryScopes{.node_local = true, .ipv4_broadcast = true};
   if (ip == "local") options.ip.reset();
   return options;
 }
