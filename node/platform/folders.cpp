@@ -84,16 +84,20 @@ Result<fs::path> user_run_folder() {
   return first_of(places, "/tmp/robotraconteur-run-" + std::to_string(::getuid()));
 }
 
+bool is_own_folder(const fs::path& folder) {
+  struct stat status {};
+  return ::lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == ::geteuid();
+}
+
 Result<fs::path> make_user_run_folder() {
   const auto run = user_run_folder();
   if (!run) return run;
   std::error_code error;
   if (fs::create_directories(*run, error)) fs::permissions(*run, fs::perms::owner_all, error);
-  struct stat status {};
-  if (::stat(run->c_str(), &status) != 0)
-    return make_error(ErrorCode::system_resource_error, "create " + run->string() + ": " + error.message());
-  if (status.st_uid != ::geteuid())
-    return make_error(ErrorCode::system_resource_permission_denied, run->string() + " belongs to another user");
+  if (error) return make_error(ErrorCode::system_resource_error, "create " + run->string() + ": " + error.message());
+  if (!is_own_folder(*run))
+    return make_error(ErrorCode::system_resource_permission_denied,
+                      run->string() + " belongs to another user or is a link, expected a folder of this user's");
   return run;
 }
 

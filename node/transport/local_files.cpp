@@ -73,6 +73,10 @@ fs::path by_name(const fs::path& base, const std::string& name, const char* exte
   return base / "by-nodename" / (name + extension);
 }
 
+fs::path base_in(const fs::path& run) {
+  return run / "transport" / "local";
+}
+
 Error file_error(const char* what, const fs::path& path, const std::string& why) {
   return make_error(ErrorCode::system_resource_error, std::string(what) + " " + path.string() + ": " + why);
 }
@@ -145,12 +149,19 @@ Result<fs::path> public_bases_folder() {
   return *system / "transport" / "local";
 }
 
+Result<fs::path> own_base() {
+  const auto run = user_run_folder();
+  if (!run) return run;
+  return base_in(*run);
+}
+
 Result<std::vector<LocalBase>> all_local_bases() {
   const auto publics = public_bases_folder();
   if (!publics) return publics.error();
   const auto run = user_run_folder();
   if (!run) return run.error();
-  std::vector<LocalBase> bases{{*run / "transport" / "local", ""}};
+  std::vector<LocalBase> bases;
+  if (is_own_folder(*run)) bases.push_back({base_in(*run), ""});
   std::error_code error;
   for (fs::directory_iterator entry(*publics, error), end; !error && entry != end && bases.size() < max_bases;
        entry.increment(error)) {
@@ -169,7 +180,7 @@ Result<std::vector<fs::path>> local_bases(const ConnectionUrl& url) {
   if (url.user.empty() || url.user == me) {
     const auto run = user_run_folder();
     if (!run) return run.error();
-    bases.push_back(*run / "transport" / "local");
+    if (is_own_folder(*run)) bases.push_back(base_in(*run));
     if (!me.empty()) bases.push_back(*publics / me);
     if (url.user.empty() && me != "root") bases.push_back(*publics / "root");
   } else {
@@ -235,7 +246,7 @@ Result<LocalFolders> make_local_folders() {
   const auto run = make_user_run_folder();
   if (!run) return run.error();
   std::error_code error;
-  LocalFolders folders{*run / "transport" / "local", *run / "socket"};
+  LocalFolders folders{base_in(*run), *run / "socket"};
   for (const auto& folder : {folders.base, folders.sockets}) {
     fs::create_directories(folder, error);
     if (error) return file_error("create", folder, error.message());

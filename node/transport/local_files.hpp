@@ -44,6 +44,9 @@ class LocalNodeFiles {
   std::vector<LockedFile> infos_;
 };
 
+/// Where this user's nodes leave their info files, be there such a folder or not.
+/// Errors   those of user_run_folder().
+[[nodiscard]] Result<std::filesystem::path> own_base();
 /// Folders of info files that a client of `url` looks through, in order.
 /// Errors   those of user_run_folder().
 [[nodiscard]] Result<std::vector<std::filesystem::path>> local_bases(const ConnectionUrl& url);
@@ -58,7 +61,7 @@ struct LocalBase {
   std::filesystem::path path;
   std::string user;  ///< whose public base it is; empty: this user's own
 };
-/// This user's, and the public ones of all users, which may be none yet.
+/// This user's, where it is not somebody else's folder, and the public ones of all users, which may be none yet.
 /// Errors   those of system_run_folder() and user_run_folder(); out_of_system_resource, likewise.
 [[nodiscard]] Result<std::vector<LocalBase>> all_local_bases();
 /// The folder in which a public base has a folder for each user.

@@ -105,6 +105,7 @@ struct LocalWatch::State {
     const int number = inotify->native_handle();
     Watched now;
     if (const auto publics = public_bases_folder()) watch_folder(number, *publics, now);
+    if (const auto base = own_base()) watch_folder(number, *base / "by-nodeid", now);  // it may come yet
     if (const auto bases = all_local_bases())
       for (const auto& base : *bases) watch_folder(number, base.path / "by-nodeid", now);
     for (const auto& [descriptor, names] : watched)

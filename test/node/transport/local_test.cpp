@@ -16,6 +16,7 @@
 #include "node/platform/folders.hpp"
 #include "node/platform/locked_file.hpp"
 #include "node/platform/node_id_store.hpp"
+#include "node/transport/local_watch.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/node/transport/sandbox.hpp"
 
@@ -122,6 +123,34 @@ TEST_CASE("info files are read as the reference writes them") {
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: relative.sock\n").has_value());
   CHECK_FALSE(parse_local_info("nodeid: nonsense\nsocket: /a.sock\n").has_value());
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: /a\0b.sock\n"sv).has_value());
+}
+
+TEST_CASE("what lies in somebody else's folder is not taken for this user's") {
+  const Sandbox sandbox;
+  const auto folders = make_local_folders().value();
+  const auto run = *user_run_folder();
+  const NodeIdentity forged{random_node_id(), "forged.node"};
+  auto files = LocalNodeFiles::take(folders.base, forged).value();
+  REQUIRE(files.publish({forged, (folders.sockets / "a.sock").string(), user_name(), "nonce"}).has_value());
+  REQUIRE(list_local_nodes().value().size() == 1);
+  const auto check = [&] {
+    CHECK(list_local_nodes().value().empty());
+    CHECK(error_of([&] { connect("rr+local:///?nodename=forged.node&service=Sum"); }).code ==
+          ErrorCode::node_not_found);
+    const auto made = make_local_folders();
+    REQUIRE_FALSE(made.has_value());
+    CHECK(made.error().code == ErrorCode::system_resource_permission_denied);
+  };
+  const fs::path elsewhere = run.string() + ".elsewhere";
+  fs::rename(run, elsewhere);
+  fs::create_directory_symlink(elsewhere, run);  // who made the link may change it
+  check();
+  fs::remove(run);
+  fs::rename(elsewhere, run);
+  REQUIRE(list_local_nodes().value().size() == 1);
+  if (::geteuid() != 0) return;  // only root can give a folder away
+  REQUIRE(::chown(run.c_str(), 65534, static_cast<gid_t>(-1)) == 0);
+  check();
 }
 
 TEST_CASE("a process without a file descriptor to spare doesn't take local nodes for gone") {
