@@ -92,8 +92,9 @@ TlsStream::TlsStream(std::unique_ptr<ByteStream> inner, TlsContextPtr context, T
 
 TlsStream::~TlsStream() = default;
 
-/// Asks for the certificate of this host, and takes no other's.
-bool TlsStream::set_host(const std::string& host) {
+/// Asks for the certificate of this host, and takes no other's. The zone is no part of its name.
+bool TlsStream::set_host(const std::string& zoned_host) {
+  const auto host = zoned_host.substr(0, zoned_host.find('%'));
   X509_VERIFY_PARAM* const parameters = SSL_get0_param(ssl_.get());
   if (X509_VERIFY_PARAM_set1_ip_asc(parameters, host.c_str()) == 1) return true;
   ERR_clear_error();

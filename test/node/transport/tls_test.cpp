@@ -305,7 +305,7 @@ TEST_CASE("HTTPS: a client takes the certificate of the host that it asked for, 
     return WebCertificate{lab.folder().write(std::string(name) + ".pem", made.certificate),
                           lab.folder().write(std::string(name) + ".key", made.key)};
   };
-  const WebCertificate certificates[] = {server("one", {"one.example", "127.0.0.1", "::1"}),
+  const WebCertificate certificates[] = {server("one", {"one.example", "127.0.0.1", "::1", "fe80::1"}),
                                          server("two", {"two.example", "*.two.example"})};
   const auto at_server = make_web_tls(certificates).value();
   const auto at_client = make_web_client_tls({{lab.folder().write("web-ca.pem", ca.certificate)}, {}, {}}).value();
@@ -315,7 +315,8 @@ TEST_CASE("HTTPS: a client takes the certificate of the host that it asked for, 
     TlsPair pair(at_client, at_server, 1000, peer);
     return pair.client_result ? std::string("good") : pair.client_result.error().message;
   };
-  for (const auto* host : {"one.example", "127.0.0.1", "::1", "two.example", "TWO.example", "a.two.example"})
+  for (const auto* host :
+       {"one.example", "127.0.0.1", "::1", "fe80::1%eth0", "two.example", "TWO.example", "a.two.example"})
     CHECK(result_for(host) == "good");
   for (const auto* host : {"one.example", "two.example", "TWO.example", "a.two.example"})
     CHECK(at_server->has_name(host));

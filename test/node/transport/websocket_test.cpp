@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 #include <string>
 
+#include "node/transport/http_connect.hpp"
 #include "test/node/transport/memory_stream.hpp"
 
 using namespace rr;
@@ -251,4 +252,27 @@ TEST_CASE("a read that is cancelled between two of its steps ends") {
   io.run();
   CHECK(result.error == asio::error::operation_aborted);
   CHECK(pings.reads == 1);
+}
+
+TEST_CASE("a server is asked for its address without the zone") {
+  const std::pair<const char*, const char*> hosts[] = {
+      {"rr+ws://[fe80::1%25eth0]:81/?service=x", "Host: [fe80::1]:81\r\n"},
+      {"rr+ws://[fe80::1%25eth0]/?service=x", "Host: [fe80::1]\r\n"},
+      {"rr+ws://robot:81/?service=x", "Host: robot:81\r\n"}};
+  for (const auto& [url, line] : hosts) {
+    asio::io_context io;
+    MemoryStreams streams{io.get_executor()};
+    asio::co_spawn(io, connect_websocket(std::move(streams.client), parse_url(url).value(), {}), asio::detached);
+    std::string request;
+    auto work = [](ByteStream& server, std::string& into) -> awaitable<void> {
+      Bytes buffer(10'000);
+      const auto read = co_await server.read_some(buffer);
+      into = as_text(ByteSpan(buffer).first(read.bytes));
+    };
+    asio::co_spawn(io, work(*streams.server, request), asio::detached);
+    io.poll();
+    CHECK_THAT(request, Catch::Contains(line));
+    streams.server->close();
+    io.poll();
+  }
 }
