@@ -165,6 +165,8 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
       if (!v6_->joined.contains(interface))
         for (const auto scope : group_scopes(scopes_)) {
           error_code ignored;  // an interface without multicast
+          // One whose IPv6 was off for a while has lost its memberships, but may not join a second time.
+          v6_->socket.set_option(asio::ip::multicast::leave_group(group(scope, 0), interface), ignored);
           v6_->socket.set_option(asio::ip::multicast::join_group(group(scope, 0), interface), ignored);
         }
     v6_->joined = present;  // an interface that has gone takes its membership along

@@ -74,6 +74,16 @@ class Network:
         """Its IPv6 address on the link, without the zone."""
         return self._ip("-n", self._names[host + 1], "-6", "-o", "addr", "show", "dev", "eth0", "scope", "link").split()[3].split("/")[0]
 
+    @contextlib.contextmanager
+    def without_ipv6(self, host):
+        """The host's interface has none meanwhile: its packets are too short for it."""
+        self._ip("-n", self._names[host + 1], "link", "set", "eth0", "mtu", "1200")
+        try:
+            yield
+        finally:
+            self._ip("-n", self._names[host + 1], "link", "set", "eth0", "mtu", "1500")
+            self._wait_for_addresses()
+
     def pull_cable(self, host):
         self._ip("-n", self._names[host + 1], "link", "set", "eth0", "down")
 

@@ -250,6 +250,25 @@ def test_a_loopback_address_is_taken_from_nobody_else_on_the_link(network, start
     assert IDS[0] not in heard
 
 
+def test_nodes_are_found_again_when_an_interface_had_no_ipv6_for_a_while(network, start):
+    """Its memberships have gone with its addresses; its number has stayed."""
+    with network.call(1, lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as heard:
+        heard.bind(("", PORT))
+        heard.settimeout(10)
+
+        def hear_requests():
+            """The three that are sent whenever the addresses have changed."""
+            for _ in range(3):
+                assert b"Request" in heard.recv(8192)
+
+        watch = Watch(start(0, OURS, "watch", "all"))
+        hear_requests()
+        with network.without_ipv6(0):
+            hear_requests()
+    serve(start, "ours", 1, "a.node", IDS[1])
+    watch.wait_for(lambda event: event["id"] == IDS[1], seconds=20)
+
+
 def test_localhost_is_served_by_a_machine_without_ipv6(network, start, tmp_path):
     config = tmp_path / "gateway.json"
     config.write_text(json.dumps({"listen": ["localhost:8082"], "devices": []}))
