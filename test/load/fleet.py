@@ -31,8 +31,8 @@ class Fleet:
         self.ports = json.loads(self.process.next_line(60))
         self.pid = self.process.process.pid
 
-    def devices(self):
-        return [{"name": f"sensor-{i}", "url": f"rr+tcp://127.0.0.1:{port}/?service=Sensor"}
+    def devices(self, **options):
+        return [{"name": f"sensor-{i}", "url": f"rr+tcp://127.0.0.1:{port}/?service=Sensor", **options}
                 for i, port in enumerate(self.ports)]
 
     def stop(self):
@@ -72,6 +72,16 @@ def share_of_a_core(pid, seconds):
     return (cpu_seconds(pid) - before) / (time.monotonic() - begin)
 
 
+def resident_when_idle(folder, devices):
+    """Of a gateway to devices that have been found, and their sessions rest."""
+    folder.mkdir()
+    with running(Gateway(folder, devices)) as gateway:
+        gateway.wait_until_ready()
+        gateway.wait_for_online(lambda online: online == len(devices), 120)
+        time.sleep(IDLE_SECONDS)
+        return resident_bytes(gateway.pid)
+
+
 def measure(folder, count):
     with running(Fleet(folder, count)) as fleet:
         begin = time.monotonic()
@@ -79,14 +89,14 @@ def measure(folder, count):
             gateway.wait_for_online(lambda online: online == count, 120)
             online = time.monotonic() - begin
             idle = share_of_a_core(gateway.pid, IDLE_SECONDS)
-            resident = resident_bytes(gateway.pid)
+            relayed = resident_bytes(gateway.pid)
+            shared = resident_when_idle(folder / "shared", fleet.devices(mode="shared"))
             fleet.stop()
             offline = gateway.wait_for_online(lambda online: online == 0, 600)
-    (folder / "none").mkdir()
-    with running(Gateway(folder / "none", [])) as gateway:
-        empty = resident_bytes(gateway.pid)
+    empty = resident_when_idle(folder / "none", [])
     yield Row(f"{count} devices: until all are online", online, None, "s", promise=60)
-    yield Row("memory of the gateway for each", (resident - empty) / count / 1e3, None, "kB", promise=20)
+    yield Row("memory of the gateway for each, relayed", (relayed - empty) / count / 1e3, None, "kB", promise=20)
+    yield Row("memory of the gateway for each, shared", (shared - empty) / count / 1e3, None, "kB", promise=20)
     yield Row("CPU while nobody uses them", idle * 100, None, "% of a core", promise=5)
     yield Row("until all are seen as offline", offline, None, "s", promise=OFFLINE_SECONDS)
 

@@ -39,6 +39,17 @@ class ServiceIndexObject : public ServiceObject {
   }
 };
 
+/// Read once for all nodes of the program: a gateway has one for each shared device.
+const std::shared_ptr<const TypeRegistry>& index_types() {
+  static const auto types = [] {
+    auto read = std::make_shared<TypeRegistry>();
+    // The text is our own: that it is valid is what the tests of this file prove.
+    if (!read->add({std::string(service_index_definition)}, RobdefMode::compat)) std::abort();
+    return std::shared_ptr<const TypeRegistry>(std::move(read));
+  }();
+  return types;
+}
+
 Value describe(const HostedService& service, const NodeIdentity& node, std::string_view base_url) {
   MapInt32 implements;
   for (const auto& base : service.root_type().implements)
@@ -76,10 +87,8 @@ Value describe(const std::vector<KnownNode>& nodes, const std::function<bool(Ent
 }  // namespace
 
 std::shared_ptr<HostedService> make_service_index() {
-  auto types = std::make_shared<TypeRegistry>();
-  // The text is our own: that it is valid is what the tests of this file prove.
-  if (!types->add({std::string(service_index_definition)}, RobdefMode::compat)) std::abort();
-  auto service = HostedService::make(std::string(service_index_name), std::make_shared<ServiceIndexObject>(), types);
+  auto service =
+      HostedService::make(std::string(service_index_name), std::make_shared<ServiceIndexObject>(), index_types());
   return std::move(service.value());
 }
 

@@ -1,6 +1,7 @@
 // How a session of a client with a service is set up, who speaks in it, what it is refused for, and how it ends.
 #include <catch2/catch.hpp>
 
+#include "core/session/service/service_index.hpp"
 #include "test/core/session/loopback.hpp"
 #include "test/support/print.hpp"
 
@@ -250,6 +251,12 @@ TEST_CASE("the service index lists services with their URLs") {
         "rr+tcp://127.0.0.1:1/?nodeid=11111111-0200-0000-0000-000000000000&service=arm");
   const auto routed = pair.client->call_function("RobotRaconteurServiceIndex", "GetRoutedNodes", {}, pair.now);
   CHECK(pair.completion(routed).value().get_if<MapInt32>()->items.empty());
+}
+
+TEST_CASE("the definition of the service index is read once for all nodes") {
+  const ServiceDirectory one({service_id, "one"});
+  const ServiceDirectory other({client_id, "other"});
+  CHECK(one.find(service_index_name)->shared_types() == other.find(service_index_name)->shared_types());
 }
 
 TEST_CASE("messages above the limit are refused: before login 512 KiB, then the configured size") {
