@@ -222,7 +222,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void every(std::chrono::nanoseconds period, std::function<void()> work) {
     if (period <= std::chrono::nanoseconds::zero())
       throw std::invalid_argument("Node::every: the period must be longer than nothing");
-    auto guarded = [this, work = std::move(work)] { run_handler("every", work); };
+    auto guarded = [this, work = std::move(work)] { run_handler("Node", "every", work); };
     const auto job = std::make_shared<Repeat>(io_, period, std::move(guarded));
     job->timer.expires_after(period);
     repeats_.push_back(job);
@@ -232,7 +232,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void post(std::function<void()> work) {
     asio::post(io_, [this, alive = std::weak_ptr(alive_), work = std::move(work)] {
       if (alive.expired()) return work();  // the node's io_context is somebody else's, and outlives it
-      run_handler("post", work);
+      run_handler("Node", "post", work);
     });
   }
 
@@ -288,8 +288,12 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     const auto client = clients_.find(id);
     if (client != clients_.end() && client->second->service() == &service)
       return client->second->call_callback(paths, callback, arguments, std::move(done));
-    asio::post(io_, [done = std::move(done), name = callback.name] {
-      done(make_error(ErrorCode::connection_error, "callback '" + name + "': the client is not connected"));
+    if (!done) return;
+    asio::post(io_, [this, alive = std::weak_ptr(alive_), done = std::move(done), name = callback.name] {
+      if (alive.expired()) return;
+      run_handler("callback", name, [&] {
+        done(make_error(ErrorCode::connection_error, "callback '" + name + "': the client is not connected"));
+      });
     });
   }
   ClientId current_client() const override { return current_client_; }
@@ -340,14 +344,14 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
  private:
   using Arrival = std::shared_ptr<asio::cancellation_signal>;
 
-  /// `what`  the function that the work was given to.
-  void run_handler(const char* what, const std::function<void()>& work) {
+  /// `kind`, `name`  of what the work was given to.
+  void run_handler(std::string_view kind, std::string_view name, const std::function<void()>& work) {
     const std::weak_ptr alive = alive_;
     try {
       work();
     } catch (...) {
       if (alive.expired()) throw;  // there is nobody to report it
-      report(describe_failure("Node", what, handler_error(std::current_exception())));
+      report(describe_failure(kind, name, handler_error(std::current_exception())));
     }
   }
 

@@ -152,7 +152,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   /// Calls a callback of one client. `done` is called once, on the node's thread and not before this returns: with the
   /// client's answer (null for void callbacks) or error, or when it took too long or the client is gone; not any more
-  /// when the node is destroyed. An object that is known by several paths is called by one that the client uses.
+  /// when the node is destroyed. What it throws is reported (NodeOptions::report); it may be null. An object that is
+  /// known by several paths is called by one that the client uses.
   /// Throws   std::invalid_argument: no such callback, wrong number of arguments or types.
   void call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
                      CallbackDone done);

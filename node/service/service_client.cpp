@@ -334,7 +334,7 @@ void ServiceClient::call_callback(const std::vector<std::string>& paths, const M
                                        "callback '" + callback.name + "': the client does not use the object");
   if (called) {
     callbacks_.emplace(*called, CalledCallback{&callback, std::move(done)});
-  } else {
+  } else if (done) {
     // Not before the caller has returned: nobody expects an answer in the middle of a call.
     post([this, self = shared_from_this(), name = callback.name, done = std::move(done), error = called.error()] {
       if (owner_) notify("callback", name, [&] { done(error); });

@@ -110,7 +110,7 @@ class ServiceStub : public std::enable_shared_from_this<ServiceStub> {
     if (!object) throw std::logic_error(std::string(rr_object_type()) + " has no clients: none has asked for it");
     object->call_callback(client, callback, {pack_value(std::move(arguments))...},
                           [done = std::move(done)](Result<Value> answer) {
-                            done(answer ? try_unpack_value<R>(*answer) : Result<R>(answer.error()));
+                            if (done) done(answer ? try_unpack_value<R>(*answer) : Result<R>(answer.error()));
                           });
   }
   template <class... Args>

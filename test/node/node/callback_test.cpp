@@ -1,4 +1,5 @@
 // Callbacks of clients, called by services over real sockets.
+#include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
 
 #include "test/node/node/node_fixture.hpp"
@@ -34,14 +35,22 @@ struct Bell {
   std::shared_ptr<Object> clapper = service->make_object("Clapper");  ///< one object, known by two paths
   ClientId client = 0;
   std::vector<Result<Value>> answers;
-  RunningNode node{[this](Node& made) {
+  std::vector<std::string> reports;
+  RunningNode node{[this](Node& made) { prepare(made); }, options()};
+
+  NodeOptions options() {
+    NodeOptions made;
+    made.report = [this](const std::string& problem) { reports.push_back(problem); };
+    return made;
+  }
+  void prepare(Node& made) {
     service->on_client_connected([this](ClientId id) { client = id; });
     service->function("ring", [this] { ask(service->current_client()); });
     service->function("settle", [] {});
     for (const char* side : {"left", "right"}) service->objref(side, [this] { return clapper; });
     clapper->function("settle", [] {});
     made.add(service);
-  }};
+  }
 
   void ask(ClientId whom) {
     service->call_callback(whom, "ask", {"who is there?"},
@@ -128,6 +137,39 @@ TEST_CASE("calls to clients that are gone, or go, end with an error") {
   });
   bell.node.ask([](Node&) { return 0; });
   CHECK(bell.answers_now().back().error().message == "callback 'ask': the client is not connected");
+}
+
+TEST_CASE("who hears the end of a callback may throw, or be nobody, wherever the client is") {
+  Bell bell;
+  const auto client = rr::connect(bell.node.url("bell"));
+  const auto call = [&](Object& object, ClientId whom) {
+    object.call_callback(whom, "ask", {"who is there?"},
+                         [](const Result<Value>&) { throw std::runtime_error("unheard"); });
+    object.call_callback(whom, "ask", {"who is there?"}, nullptr);
+  };
+  bell.node.ask([&](Node&) {
+    call(bell.service->root(), bell.client);
+    call(bell.service->root(), bell.client + 1);  // is not there
+    call(*bell.clapper, bell.client);             // does not use it
+    return 0;
+  });
+  client.call("settle");
+  client.call("settle");  // behind the answers
+  const auto unheard = "callback 'ask': its handler failed: unheard";
+  CHECK(bell.node.ask([&](Node&) { return bell.reports; }) == std::vector<std::string>{unheard, unheard, unheard});
+}
+
+TEST_CASE("a node that has gone calls nobody who waits for a callback") {
+  boost::asio::io_context io;
+  const auto service = Service::from_text({definition}, "bell", "Bell");
+  service->serve_partly("it is a test");
+  auto node = std::make_unique<Node>(io, "test.node");
+  node->add(service);
+  bool is_ended = false;
+  service->call_callback(1, "ask", {"who is there?"}, [&](const Result<Value>&) { is_ended = true; });
+  node.reset();
+  io.run();
+  CHECK_FALSE(is_ended);
 }
 
 TEST_CASE("callbacks and arguments that are not there are refused where they are called") {
