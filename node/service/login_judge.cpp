@@ -18,8 +18,8 @@ void LoginJudge::judge(const LoginRequested& login, const asio::any_io_executor&
     Result<AuthenticatedUser> result = make_error(ErrorCode::authentication_error, "Authentication Failed");
     try {
       result = login.authenticator->authenticate(login.attempt);
-    } catch (const std::exception&) {
-      // Its text may hold anything: the client only hears that it failed.
+    } catch (...) {
+      // Its text, where it has one, may hold anything: the client only hears that it failed.
     }
     asio::post(executor, [login, done, result = std::move(result)] { done(result); });
   });

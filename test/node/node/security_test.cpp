@@ -24,6 +24,7 @@ class TestAuthenticator final : public Authenticator {
   Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
     const auto* password = attempt.credentials.find("password");
     if (attempt.username == "broken") throw std::runtime_error("secret detail");
+    if (attempt.username == "odd") throw 5;
     if (attempt.username == "slow") {
       std::unique_lock lock(mutex_);
       is_waiting_ = true;
@@ -95,11 +96,13 @@ TEST_CASE("a handler knows who calls") {
 TEST_CASE("without the right password there is no way in") {
   Vaults vaults;
   const auto url = vaults.node.url("vault");
-  for (const auto& error : {error_of([&] { connect(url, "alice", "guess"); }), error_of([&] { connect(url); }),
-                            error_of([&] { connect(url, "broken", "secret"); })}) {
+  for (const auto& error :
+       {error_of([&] { connect(url, "alice", "guess"); }), error_of([&] { connect(url); }),
+        error_of([&] { connect(url, "broken", "secret"); }), error_of([&] { connect(url, "odd", "secret"); })}) {
     CHECK(error.code == ErrorCode::authentication_error);
     CHECK(error.message == "connect to 'vault': Authentication Failed");
   }
+  CHECK(connect(url, "alice", "secret").call("who") == Value("alice/there"));
 }
 
 TEST_CASE("a slow login holds nobody up") {
