@@ -230,7 +230,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
   void post(std::function<void()> work) {
-    asio::post(io_, [this, alive = std::weak_ptr(alive_), work = std::move(work)] {
+    asio::post(io_, [this, alive = still_there_, work = std::move(work)] {
       if (alive.expired()) return work();  // the node's io_context is somebody else's, and outlives it
       run_handler("Node", "post", work);
     });
@@ -467,6 +467,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   ClientId current_client_ = 0;
   bool is_stopping_ = false;
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>(true);  ///< gone: handlers keep away from the node
+  const std::weak_ptr<const bool> still_there_ = alive_;  ///< for other threads: alive_ may be let go meanwhile
   const std::shared_ptr<NodeThread> thread_;
   BlockingPool blocking_pool_;
   asio::steady_timer stop_timer_;

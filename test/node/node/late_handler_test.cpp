@@ -24,6 +24,7 @@ object Patient
     property double level
     function int32 quick(int32 number)
     function int32 block(int32 number)
+    function void block_and_post(int32 count)
     function int32 wait(int32 number)
     function string greet(string name)
     function int32 ask_later(int32 number)
@@ -81,8 +82,8 @@ struct Patient {
   double level = 1;
   std::shared_ptr<Service> service = Service::from_text({definition}, "Patient", "Patient");
 
-  explicit Patient(asio::io_context& io)
-      : timer(std::make_unique<asio::steady_timer>(io, asio::steady_timer::time_point::max())) {
+  explicit Patient(Node* node)
+      : timer(std::make_unique<asio::steady_timer>(node->io_context(), asio::steady_timer::time_point::max())) {
     service->property("level")
         .get(blocking([this] {
           const std::lock_guard lock(mutex);
@@ -96,6 +97,10 @@ struct Patient {
     service->function("block", blocking([this](std::int32_t number) {
                         gate.wait();
                         return checked(number);
+                      }));
+    service->function("block_and_post", blocking([this, node](std::int32_t count) {
+                        gate.wait();
+                        for (; count > 0; --count) node->post([] {});
                       }));
     service->function("wait", [this](std::int32_t number) -> asio::awaitable<std::int32_t> {
       co_await timer->async_wait(asio::as_tuple(asio::use_awaitable));
@@ -145,7 +150,7 @@ struct Patient {
 struct PatientNode {
   explicit PatientNode(std::size_t max_blocking = 8)
       : node(std::make_unique<Node>("test.node", options_of(max_blocking))) {
-    patient = std::make_unique<Patient>(node->io_context());
+    patient = std::make_unique<Patient>(node.get());
     *report = [this](const std::string& problem) {
       const std::lock_guard lock(patient->mutex);
       patient->reports.push_back(problem);
@@ -409,6 +414,19 @@ TEST_CASE("a node goes while handlers block and wait; who answers then harms nob
   CHECK(device.patient->gate.arrived() == 1);
   opener.join();
   replies.front()(6);
+}
+
+TEST_CASE("a handler that blocks may post to its node while that goes") {
+  PatientNode device;
+  const auto one = device.connect();
+  const Pending blocked(one, "block_and_post", {Value(1000)});
+  REQUIRE(one.call("quick", 1) == Value(1));
+  REQUIRE(device.patient->gate.has_seen(1));
+  device.stop();
+  device.patient->timer.reset();
+  device.patient->gate.open();
+  device.node.reset();  // waits for the handler
+  CHECK(device.patient->gate.arrived() == 1);
 }
 
 TEST_CASE("handlers that can't wait say so where they are set; signatures are checked in every form") {
