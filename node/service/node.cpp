@@ -296,6 +296,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       });
     });
   }
+  std::size_t max_message_size() const override { return options_.max_message_size; }
   ClientId current_client() const override { return current_client_; }
   Caller find_client(ClientId id) const override {
     const auto found = clients_.find(id);

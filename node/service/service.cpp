@@ -54,6 +54,13 @@ void check_parameters(const std::string& where, const std::vector<HandlerType>& 
              ", the handler takes " + handler_type_text(taken[i]));
 }
 
+/// Of numbers and texts alone: the message is larger, by how much depends on its version and receiver.
+std::size_t payload_bytes(const Message& message) {
+  std::size_t bytes = 0;
+  for (const auto& element : message.elements) bytes += element.data.size();
+  return bytes;
+}
+
 void check_result(const std::string& where, const HandlerType& result, const TypeDefinition& type) {
   if (!returns(result, type))
     refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(result));
@@ -135,12 +142,21 @@ void Object::check_arguments(const MemberDefinition& member, const char* verb, s
                 member.parameters[i].type, *service_.types_);
 }
 
+void Object::check_size(const MemberDefinition& member, const Message& packed) const {
+  if (!service_.host_) return;
+  const auto bytes = payload_bytes(packed);
+  if (const auto limit = service_.host_->max_message_size(); bytes >= limit)
+    refuse(type_name() + "." + member.name + ": " + std::to_string(bytes) +
+           " bytes are too large for a message, limit " + std::to_string(limit));
+}
+
 void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
   const MemberDefinition& member = require_member(event, MemberKind::event);
   check_arguments(member, "fired", arguments);
   for (const std::string& path : paths()) {
     if (!service_.host_) return;  // nor after a handler has ended the node
     EventPacket packet(path, member, arguments);
+    if (const auto packed = packet.message(*service_.types_)) check_size(member, (*packed)->message);
     service_.host_->send_event(service_, packet);
   }
 }
@@ -159,8 +175,9 @@ WirePacket Object::pack_in_value(std::string_view wire, const Value& value, std:
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
   const Now now = read_clocks();
   WirePacket packet({}, member, value, time.value_or(now.utc), now.steady);
-  if (const auto packed = packet.message(*service_.types_); !packed)
-    refuse(type_name() + "." + member.name + ": " + packed.error().message);
+  const auto packed = packet.message(*service_.types_);
+  if (!packed) refuse(type_name() + "." + member.name + ": " + packed.error().message);
+  check_size(member, (*packed)->message);
   return packet;
 }
 

@@ -142,7 +142,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   Pipe pipe(std::string_view name) { return {this, std::string(name)}; }
 
   /// Fires an event to every client of the service.
-  /// Throws   std::invalid_argument: no such event, wrong number of arguments or types.
+  /// Throws   std::invalid_argument: no such event, wrong number of arguments or types, too large for a message.
   template <class... Args>
   void fire(std::string_view event, Args&&... arguments) {
     const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
@@ -159,7 +159,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
                      CallbackDone done);
 
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
-  /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type.
+  /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type or is too
+  ///          large for a message (NodeOptions::max_message_size). What is so large but for its names, or was set
+  ///          before Node::add(), is reported where it can't be sent.
   void set_wire(std::string_view wire, Value value);
   /// The same, with the time that clients get with it: of what is played back or passed on. A client that has had a
   /// later one gets a time just above that.
@@ -232,6 +234,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   std::vector<PipeEndpoint> endpoints(std::string_view pipe);
   void set_generator(std::string_view name, GeneratorHandler handler);
   void check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const;
+  /// Throws std::invalid_argument where no message of the node's can be as large as that.
+  void check_size(const MemberDefinition& member, const Message& packed) const;
   detail::MemoryForm memory_form(std::string_view name, DataType items) const;
   std::vector<std::string> paths() const;
   void release(const MemberDefinition& objref, std::optional<std::string_view> index);
@@ -277,6 +281,7 @@ class ServiceHost {
   /// `paths`  of the object: the client is called by one that it uses.
   virtual void call_callback(const Service& service, ClientId client, const std::vector<std::string>& paths,
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;
+  virtual std::size_t max_message_size() const = 0;
   virtual ClientId current_client() const = 0;
   virtual Caller find_client(ClientId id) const = 0;
   /// A handler failed by mistake.

@@ -11,15 +11,20 @@ ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDire
 
 void ServiceClient::send_event(EventPacket& packet) {
   const Now now = read_clocks();
-  // The values were checked; what fails now is the connection, and its end is heard of by itself.
-  (void)session_.send_event(packet, now);
+  note_sent(packet.member(), session_.send_event(packet, now));
   settle(now);
 }
 
 void ServiceClient::send_wire(WirePacket& packet) {
   const Now now = read_clocks();
-  (void)session_.send_wire(packet, now);
+  note_sent(packet.member(), session_.send_wire(packet, now));
   settle(now);
+}
+
+/// The end of the connection is heard of by itself.
+void ServiceClient::note_sent(const MemberDefinition& member, const Result<>& sent) {
+  if (sent || sent.error().code == ErrorCode::connection_error || !owner_) return;
+  owner_->report(std::string(member_kind_name(member.kind)) + " '" + member.name + "': " + sent.error().message);
 }
 
 void ServiceClient::release_path(const std::string& path) {
@@ -230,7 +235,7 @@ void ServiceClient::handle(const WireConnected& connected, Now now) {
   if (!value) return;
   const auto time = object.in_time(*connected.member, id_).value_or(now.utc);
   WirePacket packet(connected.path, *connected.member, *value, time, now.steady);
-  (void)session_.send_wire(packet, now);  // checked when it was set
+  note_sent(packet.member(), session_.send_wire(packet, now));
 }
 
 void ServiceClient::handle(const WireReceived& received, Now) {

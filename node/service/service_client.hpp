@@ -63,6 +63,8 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
  private:
   bool handle_event(Now now) override;
   void ended() override;
+  /// Reports what could not be sent on a connection that goes on.
+  void note_sent(const MemberDefinition& member, const Result<>& sent);
 
   void handle(Called& called, Now now);
   std::shared_ptr<LateCall> begin_late_call(const Called& called);

@@ -30,7 +30,9 @@ object Counter
     function uint64 who()
     function varvalue echo(varvalue value)
     event counted(int32 count)
+    event sampled(double[] samples)
     wire int32 newest [readonly]
+    wire double[] trace [readonly]
     wire double wish [writeonly]
     wire double both
     property double wished [readonly]
@@ -50,7 +52,8 @@ struct Counter {
   std::vector<ClientId> connected;
   std::vector<ClientId> gone;
 
-  explicit Counter(Node& node) {
+  explicit Counter(Node& node, const Value& trace = {}) {
+    if (!trace.is_null()) service->set_wire("trace", trace);
     service->property("count").get([this] { return count; }).set([this](std::int32_t value) { count = value; });
     service->property("samples").get([this] { return samples; }).set([this](std::vector<double> values) {
       samples = std::move(values);
@@ -338,6 +341,49 @@ TEST_CASE("a wire handler that fails is reported, and the client stays") {
   CHECK(error_of([&] { counter.poke_out("both", -1.0); }).message == "negative");
   CHECK(counter.call("add", 1) == Value(1));
   CHECK(device.node.ask([&](Node&) { return reports; }) == 2);
+}
+
+TEST_CASE("what is too large for a message is refused where it is fired or set, and the wire keeps its value") {
+  CounterNode device;
+  const auto counter = device.connect();
+  const auto length = [](const Value& value) { return value.to_items<double>().value().size(); };
+  std::vector<std::size_t> events, values;
+  counter.on_event("sampled", [&](std::span<const Value> samples) { events.push_back(length(samples[0])); });
+  counter.connect_wire("trace", [&](const Value& value, TimeSpec) { values.push_back(length(value)); });
+  const Value large(std::vector<double>(12 * 1024 * 1024 / 8 - 1000));
+  const Value too_large(std::vector<double>(12 * 1024 * 1024 / 8));
+  device.node.ask([&](Node&) {
+    auto& service = *device.counter->service;
+    service.fire("sampled", large);
+    service.set_wire("trace", large);
+    const auto why = Contains("bytes are too large for a message");
+    CHECK_THAT(refusal([&] { service.fire("sampled", too_large); }), why);
+    CHECK_THAT(refusal([&] { service.set_wire("trace", too_large); }), why);
+    CHECK_THAT(refusal([&] { service.set_wire_for(device.counter->connected.front(), "trace", too_large); }), why);
+    return 0;
+  });
+  REQUIRE(counter.connection().run_until([&] { return !events.empty() && !values.empty(); }, 5s));
+  CHECK(length(counter.peek_in("trace")) == length(large));
+  CHECK(events == std::vector{length(large)});
+  CHECK(values == std::vector{length(large)});
+}
+
+TEST_CASE("a wire that was set too large before its node was known says so to who connects it") {
+  std::vector<std::string> reports;
+  NodeOptions options;
+  options.max_message_size = 1024 * 1024;
+  options.report = [&](const std::string& problem) { reports.push_back(problem); };
+  std::unique_ptr<Counter> counter;
+  const auto prepare = [&](Node& made) {
+    counter = std::make_unique<Counter>(made, Value(std::vector<double>(1024 * 1024 / 8)));
+  };
+  RunningNode node(prepare, std::move(options));
+  const auto remote = rr::connect(node.url("Counter"));
+  remote.connect_wire("trace", [](const Value&, TimeSpec) {});
+  CHECK(remote.call("add", 1) == Value(1));
+  const auto heard = node.ask([&](Node&) { return reports; });
+  REQUIRE(heard.size() == 1);
+  CHECK_THAT(heard.front(), Contains("wire 'trace'") && Contains("limit"));
 }
 
 TEST_CASE("objects are found by index and looked up anew when they are replaced") {
