@@ -163,8 +163,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   ///          large for a message (NodeOptions::max_message_size). What is so large but for its names, or was set
   ///          before Node::add(), is reported where it can't be sent.
   void set_wire(std::string_view wire, Value value);
-  /// The same, with the time that clients get with it: of what is played back or passed on. A client that has had a
-  /// later one gets a time just above that.
+  /// The same, with the time that clients get with it, peeks as well: of what is played back or passed on. A client
+  /// that has had a later one gets a time just above that.
   void set_wire(std::string_view wire, Value value, TimeSpec time);
   /// The wire has no InValue again, as before the first set_wire(): for peeks, and for clients that connect it from now
   /// on. Those that have connected it keep what they received: nothing in the protocol takes it back. Throws

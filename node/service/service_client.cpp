@@ -73,7 +73,10 @@ void ServiceClient::handle(Called& called, Now now) {
     generators_.erase(generator);
     answer = std::move(*failure);
   }
-  if (answer) session_.reply(id, *answer, now);
+  if (!answer) return;
+  if (called.kind == CallKind::peek_in)  // the answer has the time that reply() is told
+    now.utc = static_cast<Object&>(*object).in_time(*called.member, id_).value_or(now.utc);
+  session_.reply(id, *answer, now);
 }
 
 // --- answers that come later ---

@@ -5,6 +5,10 @@
 #include <boost/asio/write.hpp>
 #include <catch2/catch.hpp>
 
+#include "core/session/client/client_session.hpp"
+#include "core/support/random.hpp"
+#include "core/wire/frame_scanner.hpp"
+#include "node/driver/clocks.hpp"
 #include "test/node/node/node_fixture.hpp"
 
 using namespace rr;
@@ -108,6 +112,39 @@ ClientOptions with_features(Features features) {
   ClientOptions options;
   options.connection.features = features;
   return options;
+}
+
+/// The time that a peek of the counter's wire is answered with, which clients of the library do not hand on.
+std::int64_t peeked_seconds(std::uint16_t port, std::string_view wire) {
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::socket socket(io);
+  socket.connect({boost::asio::ip::make_address("127.0.0.1"), port});
+  ClientOptions options = with_features(legacy_features);
+  options.service = "Counter";
+  options.connection.self.id = random_node_id();
+  ClientSession session(std::move(options), read_clocks());
+  FrameScanner scanner;
+  Message message;
+  std::array<std::uint8_t, 4096> buffer{};
+  while (true) {
+    while (const auto event = session.poll_event())
+      if (std::holds_alternative<Connected>(*event)) session.peek_in_value("Counter", wire, read_clocks());
+    std::size_t written = 0;
+    for (const auto& slice : session.poll_transmit())
+      written += boost::asio::write(socket, boost::asio::buffer(slice.data(), slice.size()));
+    session.handle_transmitted(written, read_clocks());
+    auto input = ByteSpan(buffer).first(socket.read_some(boost::asio::buffer(buffer)));
+    session.handle_bytes(input, read_clocks());
+    while (!input.empty()) {
+      input = input.subspan(scanner.feed(input).value());
+      if (!scanner.message()) continue;
+      REQUIRE(decode(*scanner.message(), {}, message).has_value());
+      const auto& entry = message.entries.front();
+      if (entry.type != EntryType::wire_peek_in_value_ret) continue;
+      const auto* time = message.elements_of(entry).find("packettime");
+      return load<std::int64_t>(message.children_of(*time).find("seconds")->data.data());
+    }
+  }
 }
 
 }  // namespace
@@ -231,6 +268,22 @@ TEST_CASE("a wire that is reset has no value until it is set again; clients that
   CHECK(seen_by_two.front() == Value(6));
   REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 3; }, 5s));
   CHECK(seen_by_one == std::vector<Value>{Value(5), Value(50), Value(6)});
+}
+
+TEST_CASE("a peek has the time that the value was set with; where there is none, that of the peek") {
+  CounterNode device;
+  const auto counter = device.connect();
+  const auto id = *counter.call("who").to<std::uint64_t>();
+  const auto change = [&](const auto& how) {
+    device.node.ask([&](Node&) { return how(device.counter->service->root()), 0; });
+  };
+  const auto now = read_clocks().utc.seconds;
+  change([](Object& root) { root.set_wire("newest", 5, TimeSpec{1000, 0}); });
+  CHECK(peeked_seconds(device.node.port(), "newest") == 1000);
+  change([&](Object& root) { root.set_wire_for(id, "newest", 6); });
+  CHECK(peeked_seconds(device.node.port(), "newest") == 1000);  // another client
+  change([](Object& root) { root.set_wire("newest", 7); });
+  CHECK(peeked_seconds(device.node.port(), "newest") >= now);
 }
 
 TEST_CASE("a wire is sent to who follows it now: clients leave, come back and vanish") {
