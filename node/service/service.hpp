@@ -40,6 +40,7 @@
 #include "node/service/pipe_endpoint.hpp"
 #include "node/values/exception.hpp"
 #include "node/values/handler.hpp"
+#include "node/values/shared_function.hpp"
 
 namespace rr {
 
@@ -214,11 +215,11 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     std::shared_ptr<const Handler> get = {};
     std::shared_ptr<const Handler> set = {};
     std::shared_ptr<const Handler> wire_received = {};
-    std::shared_ptr<const Value> in_value = {};                          ///< wires: what clients receive
-    std::optional<TimeSpec> in_time = {};                                ///< wires: what set_wire() was given
-    std::map<ClientId, Value> own_in_values = {};                        ///< wires: what single clients do instead
-    std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
-    std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
+    std::shared_ptr<const Value> in_value = {};                           ///< wires: what clients receive
+    std::optional<TimeSpec> in_time = {};                                 ///< wires: what set_wire() was given
+    std::map<ClientId, Value> own_in_values = {};                         ///< wires: what single clients do instead
+    std::optional<Value> out_value = {};                                  ///< wires: the newest that a client sent
+    SharedFunction<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
     std::shared_ptr<const OnEndpoint> pipe_connected = {};
     std::shared_ptr<const PacketHandler> pipe_received = {};
     std::shared_ptr<const OnEndpoint> pipe_closed = {};
@@ -392,8 +393,8 @@ class Service {
   std::string why_partly_;  ///< empty: each member needs its handler
   std::shared_ptr<HostedService> hosted_;
   ServiceHost* host_ = nullptr;
-  std::function<void(ClientId)> on_connected_;
-  std::function<void(ClientId)> on_gone_;
+  SharedFunction<void(ClientId)> on_connected_;
+  SharedFunction<void(ClientId)> on_gone_;
 };
 
 }  // namespace rr

@@ -140,7 +140,7 @@ std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
   if (called.kind == CallKind::generator_open) {
     auto opened = static_cast<Object&>(*called.object).open_generator(called);
     if (!opened) return opened.error();
-    generators_.emplace(called.generator, RunningGenerator{std::move(*opened)});
+    generators_.emplace(called.generator, RunningGenerator{std::make_shared<const Generator>(std::move(*opened))});
     return Value{};
   }
   const bool is_next = called.kind == CallKind::generator_next;
@@ -152,10 +152,10 @@ std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
     running.waiting.push_back(std::move(called));
     return std::nullopt;
   }
-  if (is_next && running.generator.start) {
+  if (is_next && running.generator->start) {
     running.is_stepping = true;
-    const auto start = running.generator.start;
-    start(called.arguments.empty() ? Value{} : std::move(called.arguments.front()), begin_late_call(called));
+    const auto generator = running.generator;  // it may end meanwhile
+    generator->start(called.arguments.empty() ? Value{} : std::move(called.arguments.front()), begin_late_call(called));
     return std::nullopt;
   }
   if (is_next) return take_step(called);
@@ -165,7 +165,7 @@ std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
       if (const auto call = late.call.lock()) call->cancel();
   for (const auto& waiting : ended.mapped().waiting)
     session_.reply(waiting.id, make_error(ErrorCode::operation_aborted, "the generator was aborted"), read_clocks());
-  const auto& generator = ended.mapped().generator;
+  const auto& generator = *ended.mapped().generator;
   if (const auto& handler = called.kind == CallKind::generator_close ? generator.close : generator.abort) handler();
   return Value{};
 }
@@ -174,12 +174,12 @@ Result<Value> ServiceClient::take_step(const Called& called) {
   // Out of the map while it runs: an exception ends it, and the client may go meanwhile.
   auto running = generators_.extract(called.generator);
   auto answer = detail::step_answer(
-      running.mapped().generator.next(called.arguments.empty() ? Value{} : called.arguments.front()));
+      running.mapped().generator->next(called.arguments.empty() ? Value{} : called.arguments.front()));
   if (!answer) return answer;
   if (!is_closed())
     generators_.insert(std::move(running));
   else if (owner_)
-    abandon_generator(running.mapped().generator);
+    abandon_generator(*running.mapped().generator);
   return answer;
 }
 
@@ -202,7 +202,7 @@ void ServiceClient::handle(const GeneratorEnded& ended, Now now) {
   if (!left) return;
   for (const auto& called : left.mapped().waiting)
     session_.reply(called.id, make_error(ErrorCode::operation_aborted, "the generator has ended"), now);
-  abandon_generator(left.mapped().generator);
+  abandon_generator(*left.mapped().generator);
 }
 
 void ServiceClient::handle(const ClientConnected& connected, Now) {
@@ -362,7 +362,7 @@ void ServiceClient::handle(const ClientGone&, Now) {
   leave_wires([](const PathMember&) { return true; });
   while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
   for (const auto& [id, running] : std::exchange(generators_, {}))
-    if (owner_) abandon_generator(running.generator);
+    if (owner_) abandon_generator(*running.generator);
   const auto left = std::exchange(service_, nullptr);
   if (left) left->forget_client(id_);
   if (!left || !owner_ || !left->on_gone_) return;

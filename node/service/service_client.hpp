@@ -116,7 +116,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   std::set<PathMember, PathMemberLess> wires_;  ///< that it follows
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
   struct RunningGenerator {
-    Generator generator;
+    std::shared_ptr<const Generator> generator;
     bool is_stepping = false;          ///< a step answers later
     std::vector<Called> waiting = {};  ///< what the client asks of it meanwhile
   };

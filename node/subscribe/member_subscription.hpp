@@ -51,8 +51,8 @@ class MemberFollower : public SubscriptionFollower, public std::enable_shared_fr
                                                           Waiters<ReceivedValue>::Done done);
   Waiters<ReceivedValue>& waiters() { return waiters_; }
 
-  std::function<void(const ReceivedValue&)> received;
-  std::function<void(const AsyncObject& client, const Error&)> failed;
+  SharedFunction<void(const ReceivedValue&)> received;
+  SharedFunction<void(const AsyncObject& client, const Error&)> failed;
 
  protected:
   /// One client's object that has the member.

@@ -31,10 +31,11 @@ void check_path(const std::string& path) {
 
 void ServiceSubscription::on_connected(std::function<void(const AsyncObject&)> handler) {
   if (core_->is_closed()) return;
-  core_->connected = handler;
+  core_->connected = std::move(handler);
   const auto core = core_;  // the handler may let go of this
+  const auto connected = core->connected;
   for (const auto& [id, client] : core->clients())
-    if (!core->is_closed()) handler(client);
+    if (connected && !core->is_closed()) connected(client);
 }
 
 WireSubscription ServiceSubscription::wire(std::string member, const MemberSubscriptionOptions& options) const {

@@ -11,6 +11,7 @@
 
 #include "node/client/async_object.hpp"
 #include "node/client/waiters.hpp"
+#include "node/values/shared_function.hpp"
 
 namespace rr {
 
@@ -78,9 +79,9 @@ class SubscriptionCore : public std::enable_shared_from_this<SubscriptionCore> {
   void close();
   bool is_closed() const { return is_closed_; }
 
-  std::function<void(const AsyncObject&)> connected;
-  std::function<void(const AsyncObject&, const Error&)> lost;
-  std::function<void(const Error&, const std::string& url)> failed;
+  SharedFunction<void(const AsyncObject&)> connected;
+  SharedFunction<void(const AsyncObject&, const Error&)> lost;
+  SharedFunction<void(const Error&, const std::string& url)> failed;
 
   /// Attaches it to the clients that are there. Not for a closed subscription.
   void follow(std::shared_ptr<SubscriptionFollower> follower);

@@ -113,6 +113,24 @@ TEST_CASE("close and abort reach the handler once; a client that goes aborts wha
   CHECK(log_now() == std::vector<std::string>{"closed", "aborted", "aborted"});
 }
 
+TEST_CASE("a generator that answers later keeps what its function has") {
+  std::vector<std::string> log;
+  RunningNode node([&](Node& it) {
+    auto scanner = make_scanner(log);
+    scanner->generator("watch", [] {
+      Generator generator;
+      generator.start = [n = 0](const Value&, const std::shared_ptr<LateCall>& call) mutable {
+        call->answer(Value(++n));
+      };
+      return generator;
+    });
+    it.add(scanner);
+  });
+  const auto scanner = connect(node.url("Scanner"));
+  auto watch = scanner.generator("watch");
+  for (std::int32_t n = 1; n <= 3; ++n) CHECK(watch.next() == Value(n));
+}
+
 TEST_CASE("generator handlers that do not fit are refused where they are set") {
   const auto scanner = Service::from_text({definition}, "Scanner", "Scanner");
   const auto none = [] { return [] { return std::optional<std::int32_t>(); }; };

@@ -104,6 +104,25 @@ TEST_CASE("clients look up again what release() names, and what a new function f
   });
 }
 
+TEST_CASE("a function that finds objects keeps what it has; so do those that hear of clients") {
+  RobotNode device;
+  std::vector<int> came, went;
+  device.node.ask([&](Node&) {
+    auto& robot = *device.robot;
+    robot.service->objref("arms", [&robot, n = 0](std::string_view) mutable { return robot.make_arm(++n); });
+    robot.service->on_client_connected([&came, n = 0](ClientId) mutable { came.push_back(++n); });
+    robot.service->on_client_gone([&went, n = 0](ClientId) mutable { went.push_back(++n); });
+    return 0;
+  });
+  for (int round = 0; round < 2; ++round) {
+    const auto robot = device.connect();
+    CHECK(robot.object("arms", std::to_string(2 * round)).get("number") == Value(2 * round + 1));
+    CHECK(robot.object("arms", std::to_string(2 * round + 1)).get("number") == Value(2 * round + 2));
+  }  // says goodbye, and waits for the answer
+  CHECK(device.node.ask([&](Node&) { return came; }) == std::vector{1, 2});
+  CHECK(device.node.ask([&](Node&) { return went; }) == std::vector{1, 2});
+}
+
 TEST_CASE("an object of another service is no object of this one") {
   RobotNode device;
   auto other = Service::from_text({definition}, "other", "Robot");

@@ -8,6 +8,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/use_future.hpp>
 #include <catch2/catch.hpp>
+#include <numeric>
 
 #include "node/driver/backoff.hpp"
 #include "test/node/node/node_fixture.hpp"
@@ -403,6 +404,47 @@ TEST_CASE("waiting for a client can be cancelled, and has an end") {
     CHECK(failure.code == ErrorCode::request_timeout);
     CHECK_THAT(failure.message, Contains("20 ms"));
   });
+}
+
+TEST_CASE("handlers of a subscription keep what they have") {
+  LampNode lamp;
+  asio::io_context io;
+  std::vector<int> connected, lost, failed, values, packets, unconnected;
+  const auto counting = [](std::vector<int>& calls) {
+    return [&calls, n = 0](const auto&...) mutable { calls.push_back(++n); };
+  };
+  auto lamps = subscribe_service(io, lamp.url(), quick());
+  lamps.on_connected(counting(connected));
+  lamps.on_lost(counting(lost));
+  lamps.on_failed(counting(failed));
+  auto light = lamps.wire("light");
+  auto flashes = lamps.pipe("flashes");
+  auto missing = lamps.wire("nonesuch");
+  light.on_value(counting(values));
+  flashes.on_packet(counting(packets));
+  missing.on_failed(counting(unconnected));
+  const auto serve_until = [&](const auto& is_done) {
+    const auto limit = std::chrono::steady_clock::now() + 20s;
+    while (!is_done() && std::chrono::steady_clock::now() < limit) io.run_one_for(1s);
+    REQUIRE(is_done());
+  };
+  for (std::size_t life = 1; life <= 2; ++life) {
+    serve_until([&] { return light.connected_count() == 1 && flashes.connected_count() == 1; });
+    CHECK(light.send(Value(1)).has_value());
+    CHECK(flashes.send(Value(1)).has_value());
+    serve_until([&] { return values.size() == life && packets.size() == 3 * life && unconnected.size() >= 2 * life; });
+    lamp.stop();
+    serve_until([&] { return lost.size() == life && failed.size() >= 2; });
+    if (life == 1) lamp.start();
+  }
+  lamps.close();
+  io.run();
+  for (const auto* calls : {&connected, &lost, &failed, &values, &packets, &unconnected}) {
+    std::vector<int> counted(calls->size());
+    std::iota(counted.begin(), counted.end(), 1);
+    CHECK(*calls == counted);
+    CHECK(calls->size() >= 2);
+  }
 }
 
 TEST_CASE("members that a service does not have are tried again, and told") {
