@@ -2,6 +2,7 @@
 
 #include "core/session/service_path.hpp"
 #include "core/types/value_size.hpp"
+#include "node/driver/clocks.hpp"
 
 namespace rr {
 
@@ -116,7 +117,7 @@ void BlockingConnection::run_handlers(std::chrono::steady_clock::time_point unti
 }
 
 bool BlockingConnection::run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout) {
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  const auto deadline = std::chrono::steady_clock::now() + bounded(timeout);
   run_handlers(deadline);
   while (!is_done()) {
     // What the peer sends is not read while handlers wait: it is the peer that waits for them.

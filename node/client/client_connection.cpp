@@ -31,8 +31,8 @@ Heartbeat quickest_heartbeat(const std::vector<ConnectionUrl>& urls) {
 /// Throws   boost::system::system_error: it was cancelled.
 awaitable<void> dial_and_start(std::vector<ConnectionUrl> urls, ConnectOptions options,
                                std::shared_ptr<ClientOpening> opening, ClientConnection::Opened done) {
-  const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
-  options.dial.timeout = options.connect_timeout;
+  options.dial.timeout = bounded(options.connect_timeout);
+  const auto deadline = std::chrono::steady_clock::now() + options.dial.timeout;
   const auto heartbeat = options.heartbeat.value_or(quickest_heartbeat(urls));
   options.connection.heartbeat_period = heartbeat.period;
   options.connection.receive_timeout = heartbeat.timeout;
@@ -47,6 +47,14 @@ awaitable<void> dial_and_start(std::vector<ConnectionUrl> urls, ConnectOptions o
   connection->start();
 }
 
+/// With times that the session can add to its clock.
+ClientOptions bounded_times(ClientOptions options) {
+  for (auto* time : {&options.connect_timeout, &options.request_timeout, &options.connection.heartbeat_period,
+                     &options.connection.receive_timeout, &options.connection.handshake_timeout})
+    *time = bounded(*time);
+  return options;
+}
+
 }  // namespace
 
 void ClientOpening::cancel() {
@@ -57,7 +65,7 @@ void ClientOpening::cancel() {
 }
 
 ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened opened)
-    : SessionDriver(std::move(stream), std::move(static_cast<ClientOptions&>(options)), read_clocks()),
+    : SessionDriver(std::move(stream), bounded_times(std::move(static_cast<ClientOptions&>(options))), read_clocks()),
       report_(std::move(options.report)),
       opened_(std::move(opened)) {}
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "node/client/async_object.hpp"
+#include "node/driver/clocks.hpp"
 
 namespace rr::detail {
 
@@ -28,7 +29,7 @@ class Waiters {
     const Id id = ++last_id_;
     auto& waiter = waiters_.emplace(id, Waiter{std::move(done), nullptr}).first->second;
     if (!timeout) return id;
-    waiter.timer = std::make_unique<boost::asio::steady_timer>(io_, *timeout);
+    waiter.timer = std::make_unique<boost::asio::steady_timer>(io_, bounded(*timeout));
     waiter.timer->async_wait([this, id, timeout, weak = std::weak_ptr(owner)](const boost::system::error_code& error) {
       const auto keep = weak.lock();
       if (error || !keep) return;

@@ -17,6 +17,7 @@
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
 #include "node/driver/accept.hpp"
+#include "node/driver/clocks.hpp"
 #include "node/driver/post_cancel.hpp"
 #include "node/platform/node_id_store.hpp"
 #include "node/service/login_judge.hpp"
@@ -416,8 +417,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     session.connection.features = options_.features;
     session.connection.max_message_size = options_.max_message_size;
     const auto heartbeat = options_.heartbeat.value_or(heartbeat_of(accepted.scheme));
-    session.connection.heartbeat_period = heartbeat.period * 12 / 10;
-    session.connection.receive_timeout = heartbeat.timeout;
+    session.connection.heartbeat_period = bounded(heartbeat.period) * 12 / 10;
+    session.connection.receive_timeout = bounded(heartbeat.timeout);
     session.connection.known_peer = accepted.known_peer;
     session.connection.is_encrypted = accepted.is_encrypted;
     if (const auto verified = accepted.stream->verified_peer(); !verified.is_any()) session.verified_node_id = verified;

@@ -78,6 +78,24 @@ TEST_CASE("a server that never says anything is given up") {
   CHECK(error.code != ErrorCode::none);
 }
 
+TEST_CASE("the longest time is long: to connect, to answer and to wait") {
+  constexpr auto longest = std::chrono::milliseconds::max();
+  RunningNode node(add_echo);
+  ConnectOptions options;
+  options.connect_timeout = longest;
+  options.request_timeout = longest;
+  options.heartbeat = Heartbeat{longest, longest};
+  const auto echo = connect(node.url("Echo"), options);
+  CHECK(echo.call("say", "x") == Value("x"));
+  std::vector<Value> values;
+  echo.connect_wire("count", [&](const Value& value, TimeSpec) {
+    values.push_back(value);
+    echo.connection().asynchronous().close(make_error(ErrorCode::connection_error, "enough"));
+  });
+  echo.connection().run_for(longest);
+  CHECK(values == std::vector{Value(5)});
+}
+
 TEST_CASE("a lost connection fails what is pending, and everything after it") {
   RunningNode node(add_echo);
   const auto echo = connect(node.url("Echo"));

@@ -406,6 +406,21 @@ TEST_CASE("waiting for a client can be cancelled, and has an end") {
   });
 }
 
+TEST_CASE("the longest time to wait for a client is long") {
+  LampNode lamp;
+  asio::io_context io;
+  auto options = quick();
+  options.connect.connect_timeout = std::chrono::milliseconds::max();
+  options.connect.request_timeout = options.connect.connect_timeout;
+  run(io, [&]() -> asio::awaitable<void> {
+    auto lamps = subscribe_service(io, lamp.url(), options);
+    const auto client = co_await lamps.client(std::chrono::milliseconds::max());
+    const auto level = co_await client.get("level");
+    CHECK(number(level) == 1);
+    lamps.close();
+  });
+}
+
 TEST_CASE("handlers of a subscription keep what they have") {
   LampNode lamp;
   asio::io_context io;
