@@ -171,18 +171,17 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
   void run() {
-    asio::signal_set signals(io_, SIGINT, SIGTERM);
-    signals.async_wait([this](const error_code& error, int) {
+    const auto signals = std::make_shared<asio::signal_set>(io_, SIGINT, SIGTERM);
+    signals->async_wait([this](const error_code& error, int) {
       if (!error) stop();
     });
-    signals_ = &signals;
-    io_.run();
-    signals_ = nullptr;
+    signals_ = signals;
+    io_.run();  // may end by an exception of what else runs there
   }
 
   void stop() {
     if (std::exchange(is_stopping_, true)) return;
-    if (signals_) signals_->cancel();
+    if (const auto signals = signals_.lock()) signals->cancel();
     close_listeners();
     for (const auto& service : services_) {
       service->on_client_connected(nullptr);
@@ -473,7 +472,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   const std::shared_ptr<NodeThread> thread_;
   BlockingPool blocking_pool_;
   asio::steady_timer stop_timer_;
-  asio::signal_set* signals_ = nullptr;
+  std::weak_ptr<asio::signal_set> signals_;  ///< of run()
   LoginJudge judge_;
 };
 

@@ -1,6 +1,7 @@
 #include "node/service/node.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 #include <catch2/catch.hpp>
@@ -491,6 +492,17 @@ TEST_CASE("stopping tells the clients; run() returns") {
   device.node.join();
   CHECK(error_of([&] { counter.call("add", 1); }).code != ErrorCode::none);
   CHECK(counter.connection().is_closed());
+}
+
+TEST_CASE("a node whose run was ended by an exception runs again, or stops") {
+  Node one("test.one"), other("test.other");
+  for (auto* node : {&one, &other}) {
+    boost::asio::post(node->io_context(), [] { throw std::runtime_error("not of the node"); });
+    CHECK_THROWS_WITH(node->run(), "not of the node");
+  }
+  boost::asio::post(one.io_context(), [&] { one.stop(); });
+  one.run();
+  other.stop();
 }
 
 TEST_CASE("garbage closes that connection and no other") {
