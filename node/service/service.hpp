@@ -323,7 +323,8 @@ class Service {
   /// Members may stay without handler: clients get NotImplementedError with this reason. Before Node::add().
   void serve_partly(std::string why) { why_partly_ = std::move(why); }
 
-  /// Which client's request is being handled; 0 outside of handlers.
+  /// Which client's request is being handled; 0 outside of handlers, and in functions that find objects: what they find
+  /// is the same for all clients.
   ClientId current_client() const { return host_ ? host_->current_client() : 0; }
   /// The same with user and endpoint.
   Caller current_caller() const { return find_client(current_client()); }
