@@ -54,6 +54,10 @@ class Dev(unittest.TestCase):
                 self.assertIn(command, done.stdout)
         self.assertFalse(self.called.exists())
 
+    def test_fuzz_knows_its_words(self):
+        for word in ("0", "1h", "fuzz_nothing", "--quik", "coverage"):
+            self.check_refused(f'fuzz: unknown word "{word}"; expected --quick, minutes, or a target as fuzz_json', "fuzz", word)
+
     def test_what_can_be_simulated_is_listed_before_anything_is_built(self):
         done = self.run_script("./dev", "demo", "--list")
         self.assertEqual(done.returncode, 0)

@@ -12,6 +12,7 @@ and descriptors are what they were. Ends with 1 where something did not hold. Th
 import argparse
 import collections
 import contextlib
+import itertools
 import json
 import os
 import pathlib
@@ -539,16 +540,24 @@ def play(site, dice, seconds, say=print):
     site.judge(before)
 
 
+def seeds_of_rounds(first=None):
+    """From `first` on; without it the same ones in each run, 1, 2, ..., and between them new ones."""
+    if first is not None:
+        yield from itertools.count(first)
+    for fixed in itertools.count(1):
+        yield fixed
+        yield random.randrange(1 << 31)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=5)
-    parser.add_argument("--seed", type=int, help="that of the first round; the next has the next one (default: any)")
+    parser.add_argument("--seed", type=int, help="that of the first round; the next has the next one (default: 1, 2, ... and new ones in turn)")
     options = parser.parse_args()
-    seed = options.seed if options.seed is not None else random.randrange(1 << 31)
     if reason := possible_faults()[1]:
         print(reason)
     until = time.monotonic() + 60 * options.minutes
-    while True:
+    for seed in seeds_of_rounds(options.seed):
         print(f"chaos, --seed {seed}", flush=True)
         folder = pathlib.Path(tempfile.mkdtemp(prefix="rr-chaos-"))
         site = Site(folder)
@@ -563,7 +572,6 @@ def main():
             return 1
         if time.monotonic() >= until:
             return 0
-        seed += 1
 
 
 if __name__ == "__main__":

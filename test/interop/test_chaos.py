@@ -1,4 +1,5 @@
 """A short part of what `./dev soak` does for as long as one likes: the same faults, by fixed seeds."""
+import itertools
 import random
 import time
 import types
@@ -16,6 +17,13 @@ def test_nothing_is_lost_or_doubled_while_everything_breaks(tmp_path, seed):
         site.close()
     assert site.findings.broken == []
     assert {"calls", "answers inside", "packets", "packets of the reference", "events", "values", "locks"} <= set(site.findings.counts)
+
+
+def test_each_soak_has_seeds_that_it_had_before_and_new_ones():
+    assert list(itertools.islice(chaos.seeds_of_rounds(7), 3)) == [7, 8, 9]
+    runs = [list(itertools.islice(chaos.seeds_of_rounds(), 6)) for _ in range(2)]
+    assert [run[::2] for run in runs] == [[1, 2, 3], [1, 2, 3]]
+    assert len({seed for run in runs for seed in run[1::2]}) == 6
 
 
 def test_the_oracle_sees_what_must_not_be(tmp_path):
