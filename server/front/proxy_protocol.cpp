@@ -28,7 +28,7 @@ std::string_view next_word(std::string_view& text) {
 }
 
 rr::Result<ProxyHeader> parse_line(std::string_view text) {
-  const auto end = text.find("\r\n");
+  const auto end = text.substr(0, longest_line).find("\r\n");
   if (end == std::string_view::npos) {
     if (text.size() >= longest_line) return broken("no end of line within 107 bytes");
     return ProxyHeader{};

@@ -171,7 +171,8 @@ TEST_CASE("PROXY headers") {
     for (const auto& wrong :
          {std::string("GET / HTTP/1.1\r\n"), std::string("PROXY TCP5 1.2.3.4 1.2.3.4 1 1\r\n"),
           std::string("PROXY TCP4 ::1 ::1 1 1\r\n"), std::string("PROXY TCP4 1.2.3.4 1.2.3.4 99999 1\r\n"),
-          std::string("PROXY TCP4\r\n"), "PROXY " + std::string(200, 'x'), version_3, too_short, too_long})
+          std::string("PROXY TCP4\r\n"), "PROXY " + std::string(200, 'x'),
+          "PROXY UNKNOWN " + std::string(100, 'x') + "\r\n", version_3, too_short, too_long})
       CHECK_FALSE(parse_proxy_header(bytes(wrong)).has_value());
   }
 }
