@@ -53,16 +53,12 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   return out;
 }
 
-/// All lines of a header as the one list that they are.
-template <class Name>
-std::string joined(const HttpRequest& request, Name name) {
-  std::string out;
+/// The last of the list that all lines of a header are; empty where there is none.
+std::string_view last_value(const HttpRequest& request, std::string_view name) {
   const auto lines = request.message.equal_range(name);
-  for (auto it = lines.first; it != lines.second; ++it) {
-    if (!out.empty()) out += ',';
-    out.append(it->value().data(), it->value().size());
-  }
-  return out;
+  std::string_view last;
+  for (auto it = lines.first; it != lines.second; ++it) last = {it->value().data(), it->value().size()};
+  return rr::trim(last.substr(last.rfind(',') + 1));
 }
 
 /// "", ":80", and what RFC 7239 calls an obfuscated port: ":_x".
@@ -91,11 +87,11 @@ std::optional<address> parse_node(std::string_view text) {
   return plain_address(out);
 }
 
-/// What one proxy said about the request that it got.
+/// What one proxy said about the request that it got. Borrowed from the request: there may be thousands.
 struct Hop {
-  std::optional<address> from;
-  std::string proto;
-  std::string host;
+  std::optional<address> from = {};
+  std::string_view proto = {};
+  std::string_view host = {};
 };
 
 Hop hop_of_forwarded(std::string_view element) {
@@ -129,18 +125,15 @@ std::vector<Hop> hops_of_forwarded(const HttpRequest& request) {
   return out;
 }
 
-std::string last_of(const std::string& list) {
-  const auto comma = list.rfind(',');
-  return std::string(
-      rr::trim(comma == std::string::npos ? std::string_view(list) : std::string_view(list).substr(comma + 1)));
-}
-
 std::vector<Hop> hops_of_x_forwarded(const HttpRequest& request) {
   std::vector<Hop> out;
-  const auto text = joined(request, "X-Forwarded-For");
-  const auto proto = last_of(joined(request, "X-Forwarded-Proto"));
-  const auto host = last_of(joined(request, "X-Forwarded-Host"));
-  for (const auto node : split(text, ',')) out.push_back({parse_node(node), proto, host});
+  const auto proto = last_value(request, "X-Forwarded-Proto");
+  const auto host = last_value(request, "X-Forwarded-Host");
+  const auto lines = request.message.equal_range("X-Forwarded-For");
+  for (auto it = lines.first; it != lines.second; ++it)
+    for (const auto node : split({it->value().data(), it->value().size()}, ','))
+      out.push_back({parse_node(node), proto, host});
+  if (out.empty()) out.push_back({std::nullopt, proto, host});
   return out;
 }
 
@@ -213,8 +206,8 @@ Arrival see_through_proxies(const HttpRequest& request, const Peer& peer, const 
     out.peer = out.address.to_string();
     if (!trust.trusts(out.address)) break;
   }
-  auto prefix = last_of(joined(request, "X-Forwarded-Prefix"));
-  while (!prefix.empty() && prefix.back() == '/') prefix.pop_back();
+  auto prefix = last_value(request, "X-Forwarded-Prefix");
+  while (prefix.ends_with('/')) prefix.remove_suffix(1);
   if (is_path_prefix(prefix)) out.prefix = prefix;
   return out;
 }
