@@ -1,5 +1,5 @@
 // What a hostile byte costs: memory at its peak, and time, for each byte that a decoder is given. Each ceiling is what
-// the worst input known takes, rounded up.
+// the worst input known takes, rounded up; docs/security.md says why that is no less.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>
