@@ -5,13 +5,12 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
-#include "core/session/url.hpp"
 #include "node/driver/backoff.hpp"
 #include "node/http/response_reader.hpp"
 #include "node/transport/tcp.hpp"
 #include "node/transport/tls.hpp"
 #include "node/transport/watchdog.hpp"
-#include "server/json/json.hpp"
+#include "server/access/issuer_document.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -25,16 +24,6 @@ constexpr std::chrono::minutes fetch_period{60};
 /// Whoever makes up names of keys has the issuer asked no more often.
 constexpr std::chrono::seconds shortest_period{30};
 constexpr std::size_t largest_document = 256 * 1024;
-constexpr std::string_view https = "https://";
-
-rr::Result<std::string> text_at(std::string_view document, const char* key) {
-  const auto json = rr::read_json(document);
-  const auto found = json && json->is_object() ? json->find(key) : rr::Json::const_iterator();
-  if (!json || !json->is_object() || found == json->end() || !found->is_string())
-    return rr::make_error(rr::ErrorCode::connection_error,
-                          "the issuer's document: expected an object with a text " + std::string(key));
-  return found->get<std::string>();
-}
 
 /// The body of what comes until the connection, or the response, ends.
 rr::awaitable<rr::Result<std::string>> read_answer(rr::ByteStream& stream) {
@@ -109,11 +98,7 @@ rr::awaitable<rr::Result<>> IssuerKeys::fetch() {
   auto url = issuer + (issuer.ends_with('/') ? "" : "/") + ".well-known/openid-configuration";
   const auto document = co_await get(std::move(url), *tls);
   if (!document) co_return document.error();
-  const auto name = text_at(*document, "issuer");
-  if (!name) co_return name.error();
-  if (*name != issuer)
-    co_return rr::make_error(rr::ErrorCode::connection_error, "the document is of the issuer " + rr::quote(*name, 200));
-  auto keys_url = text_at(*document, "jwks_uri");
+  auto keys_url = read_issuer_document(*document, issuer);
   if (!keys_url) co_return keys_url.error();
   auto keys = co_await get(std::move(*keys_url), *tls);
   if (!keys) co_return keys.error();
@@ -126,16 +111,14 @@ rr::awaitable<rr::Result<std::string>> IssuerKeys::get(std::string url, rr::TlsC
   const auto fail = [&url](const std::string& why) {
     return rr::make_error(rr::ErrorCode::connection_error, rr::quote(url, 200) + ": " + why);
   };
-  if (!url.starts_with(https)) co_return fail("expected https://");
-  // The same form, with the same port where none is named.
-  const auto parts = rr::parse_url("rr+wss://" + url.substr(https.size()), rr::ServiceInUrl::optional);
-  if (!parts) co_return fail(parts.error().message);
-  std::string host = parts->host;
-  auto socket = co_await rr::connect_tcp(std::move(host), parts->port, fetch_patience);
+  auto wanted = make_https_get(url);
+  if (!wanted) co_return fail(wanted.error().message);
+  const auto host = wanted->host;
+  auto socket = co_await rr::connect_tcp(std::move(wanted->host), wanted->port, fetch_patience);
   if (!socket) co_return fail(socket.error().message);
   if (is_stopping_) co_return fail("the gateway is stopping");
   rr::TlsPeerOptions peer;
-  peer.host = parts->host;
+  peer.host = host;
   auto tcp = rr::make_tcp_stream(std::move(*socket), fetch_patience);
   rr::TlsStream stream(std::move(tcp), std::move(tls), rr::TlsRole::client, peer);
   stream_ = &stream;
@@ -146,11 +129,7 @@ rr::awaitable<rr::Result<std::string>> IssuerKeys::get(std::string url, rr::TlsC
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(fetch_patience);
   if (const auto shaken = co_await stream.handshake(fetch_patience); !shaken) co_return fail(shaken.error().message);
-  const auto authority = url.substr(https.size(), url.find_first_of("/?", https.size()) - https.size());
-  const auto request = "GET " + (parts->path.empty() ? "/" : parts->path) +
-                       (parts->query.empty() ? "" : "?" + parts->query) + " HTTP/1.1\r\nHost: " + authority +
-                       "\r\nAccept: application/json\r\nUser-Agent: rrgate\r\nConnection: close\r\n\r\n";
-  const auto slice = rr::as_bytes(request);
+  const auto slice = rr::as_bytes(wanted->request);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   if (const auto error = co_await stream.write(slices)) co_return fail(error.message());
   auto answer = co_await read_answer(stream);
