@@ -1,7 +1,9 @@
 #include "server/record/replay.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <stdexcept>
+#include <string_view>
 
 #include "core/session/url.hpp"
 #include "server/record/replay_robdef.hpp"
@@ -37,12 +39,18 @@ Address address_of(const std::string& text, std::size_t number) {
   return {scheme + "://" + rr::format_host_port(place->host, place->port), scheme + "://" + host};
 }
 
-std::string free_name(const std::string& wanted, const std::vector<RecordedService>& taken) {
-  auto out = wanted;
-  const auto is_it = [&out](const RecordedService& each) { return each.service == out; };
-  for (int number = 2; std::any_of(taken.begin(), taken.end(), is_it); ++number)
-    out = wanted + "_" + std::to_string(number);
-  return out;
+/// Behind all of that name, not the first free one: where replays were recorded, clients see by the number which
+/// service controls this one.
+std::string control_name_beside(const std::vector<RecordedService>& recorded) {
+  const std::string name = "replay";
+  std::uint32_t last = 0;
+  for (const auto& each : recorded) {
+    const std::string_view text = each.service;
+    std::uint32_t number = text == name ? 1 : 0;
+    if (text.starts_with(name + "_")) std::from_chars(text.data() + name.size() + 1, text.data() + text.size(), number);
+    last = std::max(last, number);
+  }
+  return last == 0 ? name : name + "_" + std::to_string(last + 1);
 }
 
 rr::Exception out_of_range(std::string what) {
@@ -58,7 +66,7 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
               {[this](const McapMessage& message, McapTime shift) { play(message, shift); },
                [this](std::uint16_t channel) { service_of(channel).forget(channel); }, [this] { tell_state(); },
                [this](const rr::Error& error) { report(error.message); }}),
-      control_name_(free_name("replay", player_.recording().services())) {
+      control_name_(control_name_beside(player_.recording().services())) {
   for (const auto& recorded : player_.recording().services()) {
     auto service = ReplayedService::make(player_.recording(), recorded);
     if (!service) throw std::invalid_argument(service.error().message);

@@ -34,7 +34,8 @@ class Replay {
   Player& player() { return player_; }
   /// Of each service: what clients connect to.
   const std::vector<std::string>& urls() const { return urls_; }
-  /// Of the service that controls it, at each node: "replay", or, where a recorded service has that, "replay_2", ...
+  /// Of the service that controls it, at each node: "replay", or, where recorded services have that or "replay_2", ...,
+  /// the next number
   const std::string& control_name() const { return control_name_; }
   void stop();
 

@@ -399,6 +399,17 @@ TEST_CASE("services of the name that controls replays, and of one name at one no
   CHECK(rr::connect(address(3) + "?service=replay_3").get("file").to_text().value() == file.writer.path());
 }
 
+TEST_CASE("what controls a replay has the number behind those of all recorded services of its name") {
+  const test::Folder folder;
+  const auto [recorded, expected] = GENERATE(table<std::vector<const char*>, const char*>(
+      {{{"Arm"}, "replay"}, {{"replay_2"}, "replay_3"}, {{"replay_10", "replay_x", "replayed"}, "replay_11"}}));
+  DevFile file(folder);
+  for (const auto* name : recorded) file.add_service(name);
+  REQUIRE(file.writer.close());
+  const RunningReplay replay(file.writer.path(), {});
+  CHECK_THAT(replay.control_url(), Catch::EndsWith("?service=" + std::string(expected)));
+}
+
 TEST_CASE("a property that is slow to answer holds up no other") {
   const test::Folder folder;
   const auto service = rr::Service::from_text({"service com.slow\nstdver 0.10\nobject Dev\nproperty int32 slow "

@@ -26,14 +26,8 @@ export function ReplayBar({ link, device, list }: ReplayBarProps) {
   return <LoadedControls link={link} from={[device, service.name].map(encodeURIComponent).join("/")} list={list} />;
 }
 
-/** Where services of the names "replay", "replay_2", ... were recorded, the one that controls has the first free name. */
-function controlAmong<S extends { name: string }>(services: readonly S[]): S | undefined {
-  const find = (wanted: string): S | undefined => services.find(({ name }) => name === wanted);
-  let found = find("replay");
-  for (let number = 2; found; number += 1) {
-    const next = find(`replay_${number}`);
-    if (!next) break;
-    found = next;
-  }
-  return found ?? services[0];
+/** Where replays were recorded, there are several of the type: the one that controls has the greatest number. */
+export function controlAmong<S extends { name: string }>(services: readonly S[]): S | undefined {
+  const number = ({ name }: S): number => (name === "replay" ? 1 : Number(/^replay_(\d+)$/.exec(name)?.[1] ?? 0));
+  return [...services].sort((a, b) => number(b) - number(a))[0];
 }
