@@ -16,8 +16,8 @@ install(
   TARGETS rrgate_gateway rrgate_access rrgate_json rr_generate
   EXPORT rrgateGatewayTargets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT dev)
-install(TARGETS rrgate-create-serial rrgate-demo-conference-room rrgate-demo-create rrgate-demo-microassembly
-                rrgate-demo-webcams
+install(TARGETS rrgate-create-serial rrgate-demo-conference-room rrgate-demo-create rrgate-demo-fleet
+                rrgate-demo-microassembly rrgate-demo-webcams
         RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
 install(FILES examples/baxter/baxter.py RENAME rrgate-demo-baxter.py
         DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)

@@ -34,9 +34,11 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::uint16_t preferred_port = 8080;
+constexpr std::size_t fleet_count = 5'000;
+constexpr std::size_t max_fleet_count = 10'000;
 
 struct DemoDevice {
-  std::string_view name;
+  std::string name;
   std::string_view program;  ///< empty: a further node of the program before; one in Python ends with ".py"
   std::string_view service;
   LeaseConfig leases = {};
@@ -46,6 +48,7 @@ struct DemoDevice {
   std::vector<std::string> arguments = {};
   bool follows_first = false;  ///< is told where the first device is
   bool has_cameras = false;    ///< is told which cameras or pictures to show
+  bool is_any_number = false;  ///< there are as many of it as are asked for
   bool has_group = false;      ///< is told by what name the nodes of this demo find one another
   pid_t process = -1;
 
@@ -81,19 +84,21 @@ std::vector<DemoSystem> list_systems() {
   const DemoDevice create{
       "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
   const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam"};
-  const auto robot = [&create](std::string_view name) {
+  const auto robot = [&create](const char* name) {
     auto one = create;
     one.name = name;
     return one;
   };
   auto minimal = create;
   minimal.program = "rrgate-demo-create-minimal.py";
-  const auto assembly = [](std::string_view name, std::string_view service) {
+  const auto assembly = [](const std::string& name, std::string_view service) {
     DemoDevice part{name, "rrgate-demo-microassembly", service};
-    part.arguments = {std::string(name)};
+    part.arguments = {name};
     part.has_group = true;
     return part;
   };
+  DemoDevice sensor{"sensor", "rrgate-demo-fleet", "Sensor"};
+  sensor.is_any_number = true;
   auto riding_webcams = webcams, standing_webcams = webcams;
   riding_webcams.follows_first = true;
   standing_webcams.has_cameras = true;
@@ -102,9 +107,10 @@ std::vector<DemoSystem> list_systems() {
       {"create-minimal",
        "a mobile robot on a serial line, whose bytes are simulated, with the paper's definition (python3)",
        {minimal}},
-      {"fleet",
+      {"robots",
        "six mobile robots, each in a room and on a node of its own",
        {robot("robot-1"), robot("robot-2"), robot("robot-3"), robot("robot-4"), robot("robot-5"), robot("robot-6")}},
+      {"fleet", "thousands of sensors, each a node of its own, in one process", {sensor}},
       {"webcams", "the cameras of this machine, or two that stand in a room", {standing_webcams}},
       {"conference-room",
        "lights and colour sensors of a room, and a controller that holds the light at a target",
@@ -364,7 +370,7 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port, c
     config.access.users_file = login->users_file();
   }
   for (const auto& device : devices) {
-    DeviceConfig each{std::string(device.name), rr::parse_url(device.url()).value()};
+    DeviceConfig each{device.name, rr::parse_url(device.url()).value()};
     each.mode = DeviceMode::shared;
     each.leases = device.leases;
     each.callbacks = device.callbacks;
@@ -385,6 +391,7 @@ struct DemoOptions {
   bool is_lan = false;
   bool is_without_browser = false;
   bool is_json = false;
+  std::optional<std::size_t> count;
   std::vector<std::string> cameras;
   std::string pictures;
 };
@@ -400,6 +407,17 @@ std::string choose_cameras(const DemoOptions& options, std::vector<DemoDevice>& 
   return {};
 }
 
+/// All devices of a fleet are nodes of one program. Returns what is wrong.
+std::string choose_count(const DemoOptions& options, std::vector<DemoDevice>& devices) {
+  auto further = devices.front();
+  if (!further.is_any_number) return options.count ? "--count is an option of 'demo fleet'" : "";
+  const auto name = further.name;
+  further.program = {};
+  devices.resize(options.count.value_or(fleet_count), further);
+  for (std::size_t i = 0; i < devices.size(); ++i) devices[i].name = name + '-' + std::to_string(i + 1);
+  return {};
+}
+
 int demo(const DemoOptions& options) {
   if (options.is_list) return print_systems(options.is_json);
   const auto port = options.port.value_or(is_port_free(preferred_port) ? preferred_port : 0);
@@ -412,6 +430,7 @@ int demo(const DemoOptions& options) {
   const auto is_wanted = [&options](const DemoSystem& system) { return system.name == options.system; };
   auto devices = std::find_if(systems.begin(), systems.end(), is_wanted)->devices;
   if (const auto mistake = choose_cameras(options, devices); !mistake.empty()) return usage_error("demo", mistake);
+  if (const auto mistake = choose_count(options, devices); !mistake.empty()) return usage_error("demo", mistake);
   if (const auto missing = prepare_programs(devices); !missing.empty())
     return report_failure("demo", missing + " not found beside rrgate");
   for (auto& device : devices)
@@ -454,6 +473,9 @@ void add_demo(Commands& commands) {
       ->option_text("N");
   app.add_flag("--lan", options.is_lan, "Allow other machines, with a password that is printed")
       ->envname("RRGATE_DEMO_LAN");
+  app.add_option("--count", options.count, "fleet: how many devices")
+      ->check(CLI::Range(std::size_t{1}, max_fleet_count))
+      ->option_text("N [" + std::to_string(fleet_count) + "]");
   auto* const cameras =
       app.add_option("--device", options.cameras,
                      "webcams: a camera to show, as /dev/video0; may be repeated. auto: all of this machine, or else "

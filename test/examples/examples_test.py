@@ -55,7 +55,8 @@ class Examples(unittest.TestCase):
 
     def systems_are_there(self, build):
         for words, told in ((["rrgate-demo-conference-room"], "controller: rr+tcp://"),
-                            (["rrgate-demo-microassembly", "stages", "--group", f"examples{os.getpid()}"], "rr+tcp://")):
+                            (["rrgate-demo-microassembly", "stages", "--group", f"examples{os.getpid()}"], "rr+tcp://"),
+                            (["rrgate-demo-fleet", "--port", "0"], "rr+tcp://")):
             with subprocess.Popen([os.path.join(build, words[0]), *words[1:]], stdout=subprocess.PIPE, text=True) as system:
                 try:
                     self.assertTrue(system.stdout.readline().startswith(told))

@@ -10,14 +10,14 @@ import sys
 import tempfile
 import time
 
-from load import PROGRAMS, cpu_seconds, resident_bytes, running
+from load import cpu_seconds, resident_bytes, running
 from rows import Row, publish
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
 
 import gateways  # noqa: E402
 from http_api import fetch  # noqa: E402
-from processes import Background  # noqa: E402
+from processes import BUILD, Background  # noqa: E402
 
 IDLE_SECONDS = 30
 OFFLINE_SECONDS = 60
@@ -27,13 +27,13 @@ class Fleet:
     """So many devices in one process."""
 
     def __init__(self, folder, count):
-        self.process = Background([PROGRAMS / "fleet_device", count], folder / "fleet.log")
-        self.ports = json.loads(self.process.next_line(60))
+        program = BUILD / "examples" / "demo" / "rrgate-demo-fleet"
+        self.process = Background([program, *["--port", 0] * count], folder / "fleet.log")
+        self.urls = [self.process.next_line(60) for _ in range(count)]
         self.pid = self.process.process.pid
 
     def devices(self, **options):
-        return [{"name": f"sensor-{i}", "url": f"rr+tcp://127.0.0.1:{port}/?service=Sensor", **options}
-                for i, port in enumerate(self.ports)]
+        return [{"name": f"sensor-{number}", "url": url, **options} for number, url in enumerate(self.urls, 1)]
 
     def stop(self):
         self.process.stop()

@@ -224,7 +224,7 @@ class Demo(Files):
         listed = run("demo", "--list")
         self.assertEqual((listed.returncode, listed.stderr), (0, ""))
         self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()],
-                         ["create", "create-minimal", "fleet", "webcams", "conference-room", "microassembly", "baxter"])
+                         ["create", "create-minimal", "robots", "fleet", "webcams", "conference-room", "microassembly", "baxter"])
         with urllib.request.urlopen(self.start("webcams", "--device", "none") + "api/v1/devices", timeout=10) as answer:
             self.assertEqual([each["name"] for each in json.load(answer)["devices"]], ["webcams"])
         unknown = run("demo", "fox")

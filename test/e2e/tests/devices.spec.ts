@@ -1,5 +1,6 @@
 // The first page: devices, their states, and what it says when the gateway is away.
 import { expect, test } from "../lab_test";
+import { Program, rrgate } from "../processes";
 
 test("lists the devices with their state and services", async ({ page, lab }) => {
   await page.goto(lab.url);
@@ -97,4 +98,25 @@ test("of 5000 devices one is found, states and types are groups, and the list sc
   await page.getByLabel("Search devices").fill("nothing like it");
   await page.getByRole("button", { name: "Show all" }).click();
   await expect(page.getByRole("status").filter({ hasText: "5000 of 5000" })).toBeVisible();
+});
+
+test("of the fleet of the demo few devices are drawn at once, and each has its board", async ({ page }) => {
+  const demo = new Program(rrgate, ["demo", "fleet", "--count", "1000", "--port", "0", "--no-browser"]);
+  demo.start();
+  try {
+    const [, url = ""] = await demo.waitForOutput(/rrgate demo: (http:\/\/127\S+)/);
+    await page.goto(url);
+    await expect(page.getByText("1000 of 1000 devices online")).toBeVisible();
+    const last = page.locator('[data-device="sensor-1000"]');
+    await expect(page.locator('[data-device="sensor-1"]')).toBeVisible();
+    expect(await page.locator("[data-device]").count()).toBeLessThan(120);
+    await page.keyboard.press("End");
+    await expect(last).toBeInViewport();
+    expect(await page.locator("[data-device]").count()).toBeLessThan(120);
+    await last.getByRole("link", { name: "Sensor" }).click();
+    await expect(page.getByRole("img", { name: /^Plot of temperature/ })).toBeVisible();
+    await expect(page.locator('[data-panel="form"]')).toContainText("offset");
+  } finally {
+    await demo.kill("SIGTERM");
+  }
 });

@@ -5,10 +5,12 @@ systems_test.py BUILD_DIR
 import base64
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.request
 from pathlib import Path
 
 from serial_scenarios import DEADLINE, Program, SerialScenarios, wait_for
@@ -174,9 +176,9 @@ class CreateMinimal(SerialScenarios, unittest.TestCase):
     RRGATE = RRGATE
 
 
-class MoreRobots(unittest.TestCase):
-    def demo(self, name):
-        gateway = Program(self, RRGATE, "demo", name, "--port", 0)
+class MoreDevices(unittest.TestCase):
+    def demo(self, name, *options):
+        gateway = Program(self, RRGATE, "demo", name, "--port", 0, *options)
         self.addCleanup(gateway.process.terminate)
         return gateway.url("rrgate demo: http://127") + "devices/"
 
@@ -193,13 +195,31 @@ class MoreRobots(unittest.TestCase):
         rrgate("call", url, "Drive", "-100", "1")
         wait_for(lambda: get(url, "AngleTraveled") < -20)
 
-    def test_each_robot_of_the_fleet_drives_by_itself(self):
-        devices = self.demo("fleet")
+    def test_each_of_six_robots_drives_by_itself(self):
+        devices = self.demo("robots")
         urls = [f"{devices}robot-{number}?service=Create" for number in range(1, 7)]
         for url in urls[::2]:
             rrgate("call", url, "Drive", "100", "32767")
         wait_for(lambda: all(get(url, "DistanceTraveled") > 20 for url in urls[::2]))
         self.assertEqual([get(url, "DistanceTraveled") for url in urls[1::2]], [0, 0, 0])
+
+    def test_a_fleet_is_as_large_as_is_asked_for(self):
+        """More than a process may open at first, with the limit on descriptors that most systems have."""
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (most, most))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (1024, most))
+        devices = self.demo("fleet", "--count", 1100)
+        with urllib.request.urlopen(devices.replace("/devices/", "/api/v1/devices"), timeout=DEADLINE) as answer:
+            listed = json.load(answer)["devices"]
+        self.assertEqual([each["name"] for each in listed], [f"sensor-{number}" for number in range(1, 1101)])
+        self.assertEqual({each["state"] for each in listed}, {"online"})
+        first, last = (f"{devices}sensor-{number}?service=Sensor" for number in (1, 1100))
+        self.assertEqual([get(url, "number") for url in (first, last)], [1, 1100])
+        rrgate("set", last, "offset", "10")
+        wait_for(lambda: get(last, "temperature") > get(first, "temperature") + 5)
+        self.assertIn("expected -10 to 10", ran("set", last, "offset", "11").stderr)
+        for others in (["robots", "--count", "2"], ["fleet", "--count", "0"]):
+            self.assertIn("--count", ran("demo", *others).stderr)
 
 
 if __name__ == "__main__":

@@ -153,6 +153,15 @@ export const STANDARD: Readonly<Record<string, Preset>> = {
       ["image", 6, 0, 6, 11, { member: "FrameStream" }, "Right", " Webcams[1]"],
     ],
   },
+  // Of `rrgate demo fleet`.
+  ["experimental.fleet.Sensor"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 8, 9, { member: "temperature" }],
+      ["form", 8, 0, 4, 5, { members: ["offset"] }],
+      ["table", 8, 5, 4, 4, { member: "temperature" }],
+    ],
+  },
   // Of `rrgate demo microassembly`, whose cameras are another device.
   ["experimental.microassembly.Cell"]: {
     stop: { call: "halt", args: [] },
