@@ -75,7 +75,7 @@ Error about_device(Error error) {
 }
 
 Error lost(std::string what) {
-  return {ErrorCode::connection_error, "device: " + std::move(what)};
+  return {ErrorCode::connection_error, std::move(what)};
 }
 
 }  // namespace

@@ -124,3 +124,21 @@ TEST_CASE("of the URLs of a found device the one that answers is taken, whicheve
   watched.device->stop();
   CHECK(watched.run_out() < seconds(5));
 }
+
+TEST_CASE("a device that ends the connection says so once") {
+  Watched watched(rr::ConnectionUrl{});
+  tcp::acceptor acceptor(watched.io, {boost::asio::ip::address_v4::loopback(), 0});
+  acceptor.async_accept([](const auto&, const tcp::socket&) {});  // which closes it
+  watched.device->set_urls(
+      {rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(acceptor.local_endpoint().port()) + "/?service=x")
+           .value()});
+  watched.start();
+  for (int i = 0; i < 100 && watched.device->state() != DeviceState::offline; ++i) {
+    watched.io.restart();
+    watched.io.run_for(milliseconds(50));
+  }
+  CHECK(watched.device->last_error() == "device: closed the connection without an answer");
+  watched.device->stop();
+  acceptor.close();
+  watched.run_out();
+}
