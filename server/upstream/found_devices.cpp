@@ -16,6 +16,8 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::chrono::seconds review_period{5};
+/// For a look at a device that another node may have replaced.
+constexpr std::chrono::seconds place_patience{2};
 constexpr std::size_t max_open_questions = 8;
 constexpr std::size_t max_name_size = 64;  // of devices
 
@@ -33,6 +35,12 @@ rr::DiscoveryOptions discovery_options(const Discover& discover) {
   if (!discover.hardware) options.hardware.reset();
   options.report = [](const std::string& problem) { log(LogLevel::warning, "discovery", {{"error", problem}}); };
   return options;
+}
+
+/// Whether both lead to one server. Nodes may share it, but then all of them answer there.
+bool is_same_place(const rr::ConnectionUrl& one, const rr::ConnectionUrl& other) {
+  return one.port != 0 && one.port == other.port && one.scheme == other.scheme && one.host == other.host &&
+         one.path == other.path;
 }
 
 std::string id_text(const rr::NodeId& id) {
@@ -127,6 +135,7 @@ void FoundDevices::review(Node& node) {
     if (node.device->state() == DeviceState::online && discovery_) discovery_->confirm(node.info.node_id);
     return node.device->set_urls(urls);
   }
+  if (!take_place(node)) return;
   if (device_count_ >= config_.discover.max_devices) {
     if (!std::exchange(is_full_, true))
       log(LogLevel::warning, "found devices: too many", {{"max_devices", config_.discover.max_devices}});
@@ -142,6 +151,43 @@ void FoundDevices::review(Node& node) {
   node.device = devices_.add(std::move(made), tls_).shared_from_this();
   node.device->set_urls(urls);
   ++device_count_;
+}
+
+bool FoundDevices::take_place(Node& node) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool has_waited = node.waits_until && now >= *node.waits_until;
+  std::vector<rr::NodeId> gone;
+  bool is_held = false;
+  for (auto& [id, other] : nodes_) {
+    if (!other.device) continue;
+    const auto& urls = node.verdict.device_urls;
+    const auto& place = other.device->config().url;
+    if (std::none_of(urls.begin(), urls.end(), [&](const auto& url) { return is_same_place(url, place); })) continue;
+    if (other.device->state() == DeviceState::offline) {
+      gone.push_back(id);
+    } else if (!has_waited) {
+      is_held = true;
+      if (!node.waits_until) other.device->note_trouble();
+    }
+  }
+  if (is_held) {
+    if (!node.waits_until) node.waits_until = now + place_patience;
+    next_review_ = std::min(next_review_, *node.waits_until);
+    return false;
+  }
+  for (const auto& id : gone) {
+    auto& other = nodes_.at(id);
+    other.is_lost = true;
+    drop_device(other);
+    replaced_.push_back(other.info);
+  }
+  return true;
+}
+
+void FoundDevices::withdraw_replaced() {
+  for (const auto& node : std::exchange(replaced_, {}))
+    for (const auto& each : node.urls)
+      if (discovery_) discovery_->handle_withdrawn(node.node_id, each.url);
 }
 
 void FoundDevices::review_all() {
@@ -178,6 +224,7 @@ rr::awaitable<void> FoundDevices::run() {
       next_review_ = now + review_period;
       review_all();
     }
+    withdraw_replaced();
     for (auto& [id, node] : nodes_) {
       if (node.verdict.urls_to_ask.empty() || questions_.size() >= max_open_questions || !node.refresh.take_due(now))
         continue;

@@ -59,12 +59,19 @@ class FoundDevices {
     std::optional<std::vector<rr::ServiceInfo>> services;
     std::shared_ptr<Device> device;  ///< that was made of it; null: none
     bool is_lost = false;            ///< not announced any more: there as long as its device answers and has clients
+    /// Another device seemed to answer at its place; until then that one is looked at again.
+    std::optional<std::chrono::steady_clock::time_point> waits_until;
   };
 
   void listen();
   void handle(const rr::NodeEvent& event);
   void review(Node& node);
-  /// The same for all, and forgets those that are lost.
+  /// Forgets nodes whose devices don't answer at the place of this new one: who restarts with another id keeps its
+  /// name. Returns whether the node may have a device now; false: one there has to be looked at first.
+  bool take_place(Node& node);
+  /// Discovery forgets them, too, and tells of them when they are announced again; behind what it tells now.
+  void withdraw_replaced();
+  /// review() of all, and forgets those that are lost.
   void review_all();
   void drop_device(Node& node);
   std::string free_name(const rr::NodeDiscoveryInfo& node) const;
@@ -80,6 +87,7 @@ class FoundDevices {
   std::shared_ptr<TlsFiles> tls_;
   std::optional<rr::Discovery> discovery_;
   std::map<rr::NodeId, Node> nodes_;
+  std::vector<rr::NodeDiscoveryInfo> replaced_;            ///< by others at their place; not withdrawn yet
   std::list<boost::asio::cancellation_signal> questions_;  ///< under way
   std::size_t device_count_ = 0;
   bool is_full_ = false;

@@ -146,12 +146,43 @@ TEST_CASE("a node at another port is reached there") {
   CHECK(devices[0]["url"].get<std::string>().find(":" + std::to_string(node.port()) + "/") != std::string::npos);
 }
 
+TEST_CASE("a node that restarts with another id keeps the name of its device") {
+  TestGateway gateway(0, [](Config& config) {
+    allowing({{"test.*", {}, ""}})(config);
+    config.retry.online = std::chrono::minutes(1);  // nobody looks before the other is announced
+  });
+  auto before = std::make_optional<rr::RunningNode>([](rr::Node&) {});
+  const auto port = before->port();
+  gateway.announce(at(id_of(*before), port, "test.node"));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+  before.reset();
+  rr::RunningNode after([&](rr::Node& made) { made.listen("rr+tcp://127.0.0.1:" + std::to_string(port)); });
+  gateway.announce(at(id_of(after), port, "test.node"));
+  const auto id = rr::format_node_id(id_of(after), rr::NodeIdFormat::dashes);
+  wait_for_devices(gateway, [&](const json& all) {
+    return all.size() == 1 && all[0]["name"] == "test.node" && all[0]["node_id"] == id && all[0]["state"] == "online";
+  });
+  CHECK(wait_for_nodes(gateway, [](const json& all) { return all.size() == 1; })[0]["node_id"] == id);
+}
+
+TEST_CASE("a device that answers stays when another node is announced at its place") {
+  rr::RunningNode node([](rr::Node&) {});
+  TestGateway gateway(0, allowing({{"test.*", {}, ""}}));
+  gateway.announce(at(id_of(node), node.port(), "test.node"));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+  gateway.announce(at(rr::NodeId{{0xab, 0xcd}}, node.port(), "test.node"));
+  const auto devices = wait_for_devices(gateway, [](const json& all) { return all.size() == 2; });
+  CHECK(devices[0]["name"] == "test.node");
+  CHECK(devices[0]["state"] == "online");
+  CHECK(devices[1]["name"] == "test.node-abcd0000");
+}
+
 TEST_CASE("a configured device is not found a second time, and names stay unique") {
   TestGateway gateway(1, allowing({{"*", {}, ""}}));
   gateway.wait_for_state("online");
   gateway.announce(at(gateway.device().node_id(), gateway.device().port(), "node.x"));
   gateway.announce(at(rr::NodeId{{0xab, 0xcd}}, 1, "x"));
-  gateway.announce(at(rr::NodeId{{0x12}}, 1, ""));
+  gateway.announce(at(rr::NodeId{{0x12}}, 2, ""));
   const auto devices = wait_for_devices(gateway, [](const json& all) { return all.size() >= 3; });
   CHECK(devices.size() == 3);
   CHECK(devices[1]["name"] == "x-abcd0000");
@@ -226,7 +257,7 @@ TEST_CASE("found nodes with TLS are checked by the CA for found nodes") {
 
 TEST_CASE("a flood of nodes makes no more devices than may be") {
   TestGateway gateway(0, allowing({{"*", {}, ""}}, 3));
-  for (std::uint8_t i = 1; i <= 50; ++i) gateway.announce(at(rr::NodeId{{i}}, 1, "node" + std::to_string(i)));
+  for (std::uint8_t i = 1; i <= 50; ++i) gateway.announce(at(rr::NodeId{{i}}, i, "node" + std::to_string(i)));
   wait_for_nodes(gateway, [](const json& all) { return all.size() == 50; });
   CHECK(wait_for_devices(gateway, [](const json&) { return true; }).size() == 3);
 }
