@@ -104,6 +104,11 @@ void DetectedNodes::handle_withdrawn(const NodeId& node_id, std::string_view url
   if (node != nodes_.end()) drop_urls(node, [url](const auto& each) { return each.url == url; });
 }
 
+void DetectedNodes::forget(const NodeId& node_id) {
+  const auto node = nodes_.find(node_id);
+  if (node != nodes_.end()) drop_urls(node, [](const auto&) { return true; });
+}
+
 void DetectedNodes::handle_timeout(Now now) {
   if (!next_expiry_ || now.steady < *next_expiry_) return;
   next_expiry_.reset();

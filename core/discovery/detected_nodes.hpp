@@ -61,6 +61,8 @@ class DetectedNodes {
   void confirm(const NodeId& node_id);
   /// The node is known to have left this URL; for sources that see a node go.
   void handle_withdrawn(const NodeId& node_id, std::string_view url);
+  /// As if the node had left all of its URLs; announced once more, it is found anew.
+  void forget(const NodeId& node_id);
   void handle_timeout(Now now);
 
   // --- answers ---

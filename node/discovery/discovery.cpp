@@ -218,6 +218,10 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
     nodes_.handle_withdrawn(node_id, url);
     tell();
   }
+  void forget(const NodeId& node_id) {
+    nodes_.forget(node_id);
+    tell();
+  }
 
  private:
   struct OwnNode {
@@ -411,6 +415,9 @@ void Discovery::handle_announcement(const Announcement& announcement) {
 }
 void Discovery::handle_withdrawn(const NodeId& node_id, std::string_view url) {
   implementation_->handle_withdrawn(node_id, url);
+}
+void Discovery::forget(const NodeId& node_id) {
+  implementation_->forget(node_id);
 }
 
 }  // namespace rr

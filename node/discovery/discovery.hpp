@@ -98,6 +98,8 @@ class Discovery {
   /// The node has answered: in a flood of announcements it is not given up for others.
   void confirm(const NodeId& node_id);
   void handle_withdrawn(const NodeId& node_id, std::string_view url);
+  /// Watchers hear that the node is lost, and of it again when it is announced once more.
+  void forget(const NodeId& node_id);
 
  private:
   class Implementation;

@@ -155,39 +155,37 @@ void FoundDevices::review(Node& node) {
 
 bool FoundDevices::take_place(Node& node) {
   const auto now = std::chrono::steady_clock::now();
-  const bool has_waited = node.waits_until && now >= *node.waits_until;
-  std::vector<rr::NodeId> gone;
-  bool is_held = false;
+  const bool is_first = !node.waits_until;
+  std::vector<rr::NodeId> there;
   for (auto& [id, other] : nodes_) {
-    if (!other.device) continue;
+    // One that has never answered has a name that nobody knows it by.
+    if (!other.device || !other.device->identity()) continue;
     const auto& urls = node.verdict.device_urls;
     const auto& place = other.device->config().url;
     if (std::none_of(urls.begin(), urls.end(), [&](const auto& url) { return is_same_place(url, place); })) continue;
-    if (other.device->state() == DeviceState::offline) {
-      gone.push_back(id);
-    } else if (!has_waited) {
-      is_held = true;
-      if (!node.waits_until) other.device->note_trouble();
-    }
+    there.push_back(id);
+    if (is_first) other.device->note_trouble();
   }
-  if (is_held) {
-    if (!node.waits_until) node.waits_until = now + place_patience;
+  if (there.empty()) return true;
+  // What is known of them may be as old as their last look.
+  if (is_first) node.waits_until = now + place_patience;
+  if (now < *node.waits_until) {
     next_review_ = std::min(next_review_, *node.waits_until);
     return false;
   }
-  for (const auto& id : gone) {
+  for (const auto& id : there) {
     auto& other = nodes_.at(id);
+    if (other.device->state() != DeviceState::offline) continue;
     other.is_lost = true;
     drop_device(other);
-    replaced_.push_back(other.info);
+    replaced_.push_back(id);
   }
   return true;
 }
 
 void FoundDevices::withdraw_replaced() {
-  for (const auto& node : std::exchange(replaced_, {}))
-    for (const auto& each : node.urls)
-      if (discovery_) discovery_->handle_withdrawn(node.node_id, each.url);
+  for (const auto& id : std::exchange(replaced_, {}))
+    if (discovery_) discovery_->forget(id);
 }
 
 void FoundDevices::review_all() {

@@ -59,7 +59,7 @@ class FoundDevices {
     std::optional<std::vector<rr::ServiceInfo>> services;
     std::shared_ptr<Device> device;  ///< that was made of it; null: none
     bool is_lost = false;            ///< not announced any more: there as long as its device answers and has clients
-    /// Another device seemed to answer at its place; until then that one is looked at again.
+    /// There are devices at its place; until then they are looked at once more.
     std::optional<std::chrono::steady_clock::time_point> waits_until;
   };
 
@@ -87,7 +87,7 @@ class FoundDevices {
   std::shared_ptr<TlsFiles> tls_;
   std::optional<rr::Discovery> discovery_;
   std::map<rr::NodeId, Node> nodes_;
-  std::vector<rr::NodeDiscoveryInfo> replaced_;            ///< by others at their place; not withdrawn yet
+  std::vector<rr::NodeId> replaced_;  ///< by others at their place; discovery has not forgotten them yet
   std::list<boost::asio::cancellation_signal> questions_;  ///< under way
   std::size_t device_count_ = 0;
   bool is_full_ = false;

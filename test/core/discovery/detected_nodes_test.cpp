@@ -105,6 +105,19 @@ TEST_CASE("a source that sees a node go says so") {
   CHECK(cache.events() == "lost 1");
 }
 
+TEST_CASE("a node that is forgotten is lost once, and found when it is announced again") {
+  Cache cache;
+  cache.hear(1, "a");
+  cache.hear(1, "b");
+  const auto found = cache.events();
+  cache.nodes.forget(Cache::id(1));
+  cache.nodes.forget(Cache::id(1));
+  CHECK(cache.events() == "lost 1");
+  cache.hear(1, "a");
+  cache.hear(1, "b");
+  CHECK(cache.events() == found);
+}
+
 TEST_CASE("a flood of nodes is bounded; those that are known stay") {
   Cache cache({seconds(60), 3, 32});
   cache.hear(1, "a");
