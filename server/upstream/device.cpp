@@ -269,9 +269,10 @@ rr::awaitable<void> Device::wait_for_turn() {
   if (!pace_ || looks_again_) co_return;
   const auto look = state_ == DeviceState::connecting ? LookPace::Look::first : LookPace::Look::later;
   const auto turn = pace_->take_turn(look, std::chrono::steady_clock::now());
-  wake_.expires_at(turn);
-  while (!is_stopping_ && !looks_again_ && std::chrono::steady_clock::now() < turn)
+  while (!is_stopping_ && !looks_again_ && std::chrono::steady_clock::now() < turn) {
+    wake_.expires_at(turn);  // the end of a session may have set it
     co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
 }
 
 std::vector<rr::ConnectionUrl> Device::urls_to_try() const {
