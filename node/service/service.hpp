@@ -162,7 +162,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
   /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type or is too
   ///          large for a message (NodeOptions::max_message_size). What is so large but for its names, or was set
-  ///          before Node::add(), is reported where it can't be sent.
+  ///          before Node::add() or a client has found the object, is reported where it can't be sent, unless it has
+  ///          to wait for the stream there.
   void set_wire(std::string_view wire, Value value);
   /// The same, with the time that clients get with it, peeks as well: of what is played back or passed on. A client
   /// that has had a later one gets a time just above that.

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "node/driver/backoff.hpp"
+#include "node/driver/clocks.hpp"
 
 namespace rr::detail {
 
@@ -147,7 +148,10 @@ class SubscriptionLink : public std::enable_shared_from_this<SubscriptionLink> {
 };
 
 SubscriptionCore::SubscriptionCore(asio::io_context& io, SubscriptionOptions options)
-    : io_(io), options_(std::move(options)), waiters_(io) {}
+    : io_(io), options_(std::move(options)), waiters_(io) {
+  for (auto* each : {&options_.first_retry, &options_.longest_retry, &options_.next_url_after, &options_.member_retry})
+    *each = bounded(*each);
+}
 
 bool SubscriptionCore::offer(WantedService service) {
   if (is_closed_) return false;

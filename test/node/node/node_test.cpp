@@ -440,6 +440,29 @@ TEST_CASE("a wire that was set too large before its node was known says so to wh
   CHECK_THAT(heard.front(), Contains("wire 'trace'") && Contains("limit"));
 }
 
+TEST_CASE("an object is found although what its wire was set to before is too large for a message") {
+  NodeOptions options;
+  options.max_message_size = 1024 * 1024;
+  const auto service = Service::from_text({R"(service test.large
+object Leaf
+    wire double[] trace [readonly]
+    function int32 three()
+end
+object Root
+    objref Leaf leaf
+end
+)"},
+                                          "large", "Root");
+  service->objref("leaf", [&](std::string_view) {
+    auto leaf = service->make_object("Leaf");
+    leaf->function("three", [] { return 3; });
+    leaf->set_wire("trace", Value(std::vector<double>(1024 * 1024 / 8)));
+    return leaf;
+  });
+  RunningNode node([&](Node& made) { made.add(service); }, std::move(options));
+  CHECK(rr::connect(node.url("large")).object("leaf").call("three") == Value(3));
+}
+
 TEST_CASE("objects are found by index and looked up anew when they are replaced") {
   CounterNode device;
   const auto counter = device.connect();
