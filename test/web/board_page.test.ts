@@ -41,7 +41,13 @@ const showBoard = (state: Store<LinkState>, board: string | null = null) =>
     link: { state },
     route: { page: "service", device: "d", service: "s", path: [], view: "board", board },
     list: {
-      state: new Store({ kind: "known", devices: [{ name: "webcams", services: [{ name: "Webcam" }], safe: [] }] }),
+      state: new Store({
+        kind: "known",
+        devices: [
+          { name: "webcams", services: [{ name: "Webcam" }], safe: [] },
+          { name: "d", services: [{ name: "s" }], safe: ["s.power=0"] },
+        ],
+      }),
     },
     onlyStop: false,
   } as unknown as BoardPageProps);
@@ -63,6 +69,31 @@ test("Stop calls what the device stops by now, also where it came back with the 
   expect(after.urgent).toHaveBeenCalledWith("e_stop", [], expect.anything());
   expect(before.urgent).not.toHaveBeenCalled();
   expect(find("[data-panel]")).toBe(panel); // as it was, with what it holds
+});
+
+test("a device that came back without a function that stops it is made safe by the gateway", async () => {
+  const state = new Store<LinkState>(online(remoteOf([memberOf("function", "void", "halt")])));
+  const update = showBoard(state);
+  await settle();
+  expect(text()).toContain("calls halt()");
+  state.value = { kind: "lost", since: 0, reason: "away", retryAt: 0, remote: null };
+  await settle();
+  state.value = online(remoteOf([]));
+  await update();
+  expect(text()).not.toContain("halt()");
+  expect(text()).toContain("lets the gateway make it safe: s.power=0");
+});
+
+test("the stop of a board's file holds where the object has that function", async () => {
+  const board = packBoard({ panels: [], columns: 12, stop: { call: "freeze", args: [] } });
+  const state = new Store<LinkState>(online(remoteOf([memberOf("function", "void", "freeze")])));
+  const update = showBoard(state, board);
+  await settle();
+  expect(text()).toContain("calls freeze()");
+  state.value = online(remoteOf([]));
+  await update();
+  expect(text()).not.toContain("freeze()");
+  expect(text()).toContain("lets the gateway make it safe");
 });
 
 const panelOf = (place: Partial<Panel>): Panel => ({

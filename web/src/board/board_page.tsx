@@ -13,6 +13,7 @@ import { usePulse } from "../live/pulse";
 import { KINDS } from "../panels/panel";
 import type { Link } from "../robot/link";
 import type { Remote } from "../robot/remote";
+import type { StopCall } from "../robot/stop";
 import { Failure } from "../ui/failure";
 import { saveFile } from "../ui/save_file";
 import { Silence } from "../ui/silence";
@@ -80,7 +81,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       </div>
     );
   }
-  const stop = known ?? board.stop; // a file may say how to stop what is not known, and nothing else
+  const stop = known ?? stopOf(board, described); // a file may say how to stop what is not known, and nothing else
   if (onlyStop) {
     return (
       <div class="board-page">
@@ -171,6 +172,12 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
 
 function describe({ type, members, definitions }: Remote): Described {
   return { type, members, definitions: new Definitions(definitions), scope: scopeOf(type) };
+}
+
+/** Not once the object is known to have nothing of it: the gateway is then to make the device safe. */
+function stopOf({ stop }: Board, object: Described | null): StopCall | null {
+  const isThere = object?.members.some(({ name }) => name === stop?.call || name === stop?.set?.property) ?? true;
+  return isThere ? stop : null;
 }
 
 function Waiting() {

@@ -239,15 +239,19 @@ function standardOf(type: string, definitions: Definitions) {
   return found === undefined ? undefined : STANDARD[found];
 }
 
+/** It says nothing of a stop: that of the object is known as long as the object has it, see stopFor(). */
 export function presetFor(object: Described): Board {
+  return { panels: settle(panelsFor(object)), columns: COLUMNS, stop: null };
+}
+
+function panelsFor(object: Described): Panel[] {
   const standard = standardOf(object.type, object.definitions);
-  if (!standard) return { panels: settle(byMembers(object)), columns: COLUMNS, stop: stopFor(object) };
-  const panels = standard.panels
+  if (!standard) return byMembers(object);
+  return standard.panels
     .filter(([, , , , , settings, , place]) =>
       place === undefined ? isThere(settings, object.members) : isOfDevices(place, object.devices),
     )
     .map((spec) => makePanel(spec));
-  return { panels: settle(panels), columns: COLUMNS, stop: stopFor(object) };
 }
 
 const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;
