@@ -462,8 +462,9 @@ const german: Readonly<Record<string, string>> = {
   "gateway away": "Gateway weg",
   "Map of the floor with the robot, where it has been, and where it bumped. The pose is given in numbers below.":
     "Karte des Bodens mit dem Roboter, wo er war und wo er anstieß. Die Pose steht darunter in Zahlen.",
-  "The gateway did not send this part of the page. Load the page again.":
-    "Das Gateway hat diesen Teil der Seite nicht gesendet. Laden Sie die Seite neu.",
+  "The gateway has not sent this part of the page yet. It is asked again.":
+    "Das Gateway hat diesen Teil der Seite noch nicht gesendet. Es wird wieder gefragt.",
+  "Load the page again": "Seite neu laden",
   "There is nothing at this address:": "Unter dieser Adresse ist nichts:",
   "Colours: {0}": "Farben: {0}",
   "Colours: {0}. Change to {1}": "Farben: {0}. Wechseln zu {1}",

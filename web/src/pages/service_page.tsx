@@ -47,6 +47,8 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   // Kept from then on: what is under way on it goes on while another view is looked at.
   const wasDriven = useRef(false);
   wasDriven.current ||= isDriven;
+  const [isBoardThere, isRobotThere] = [useStore(LoadedBoard.isThere), useStore(LoadedRobot.isThere)];
+  const hasOwnStop = shown === "board" ? isBoardThere : isDriven && isRobotThere && !onlyStop;
   const width = shown === "members" || onlyStop ? "page-narrow" : `page-wide ${shown === "board" ? "page-wall" : ""}`;
   return (
     <div class={`page ${width}`}>
@@ -57,9 +59,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {link && !onlyStop && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
-      {link && (
-        <HeadStop link={link} route={route} list={list} isShown={shown === "members" || (onlyStop && isDriven)} />
-      )}
+      {link && <HeadStop link={link} route={route} list={list} isShown={!hasOwnStop} />}
       {drives && link && wasDriven.current && (
         <div hidden={!isDriven || onlyStop}>
           <LoadedRobot link={link} list={list} device={device} service={service} shown={isDriven && !onlyStop} />
@@ -125,7 +125,7 @@ interface HeadStopProps {
   isShown: boolean;
 }
 
-/** Of the object that is shown, else of the service. A board and the demo robot have their own. */
+/** Of the object that is shown, else of the service. A board and the demo robot have their own, once they are loaded. */
 function HeadStop({ link, route, list, isShown }: HeadStopProps) {
   const shown = useObject(link, "", route.path.map(formatStep).join("."), list);
   const root = useObject(link, "", "", list);

@@ -4,19 +4,55 @@
 import type { ComponentType } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { Store, useStore } from "../app/store";
+import { pause } from "../live/pause";
 import { Failure } from "./failure";
 
-export function loaded<Props>(load: () => Promise<{ default: ComponentType<Props> }>): ComponentType<Props> {
-  return (props) => {
-    const [Shown, setShown] = useState<ComponentType<Props> | null>(null);
+const FIRST_PAUSE_MS = 1_000;
+const LONGEST_PAUSE_MS = 30_000;
+
+export type Loaded<Props> = ComponentType<Props> & {
+  /** Whether the code is there; then for good. */
+  isThere: Store<boolean>;
+};
+
+/** While it is shown and its code cannot be had, as while the gateway starts anew, the code is asked for again and again. */
+export function loaded<Props>(load: () => Promise<{ default: ComponentType<Props> }>): Loaded<Props> {
+  let Shown: ComponentType<Props> | null = null;
+  const isThere = new Store(false);
+  const follow = async (failed: () => void, gone: AbortSignal): Promise<void> => {
+    for (let wait = FIRST_PAUSE_MS; !isThere.value && !gone.aborted; wait = Math.min(2 * wait, LONGEST_PAUSE_MS)) {
+      try {
+        Shown = (await load()).default;
+        isThere.value = true;
+      } catch {
+        failed();
+        await pause(wait, gone);
+      }
+    }
+  };
+  const Part: ComponentType<Props> = (props) => {
+    useStore(isThere);
     const [hasFailed, setFailed] = useState(false);
     useEffect(() => {
-      load().then(
-        ({ default: shown }) => setShown(() => shown),
-        () => setFailed(true),
-      );
+      const gone = new AbortController();
+      void follow(() => setFailed(true), gone.signal);
+      return () => gone.abort();
     }, []);
-    if (hasFailed) return <Failure text={t("The gateway did not send this part of the page. Load the page again.")} />;
-    return Shown && <Shown {...props} />;
+    if (Shown) return <Shown {...props} />;
+    return hasFailed && <Missing />;
   };
+  return Object.assign(Part, { isThere });
+}
+
+/** A gateway of another version has it by another name, which only the page loaded again knows. */
+function Missing() {
+  return (
+    <>
+      <Failure text={t("The gateway has not sent this part of the page yet. It is asked again.")} />
+      <button class="button" type="button" onClick={() => location.reload()}>
+        {t("Load the page again")}
+      </button>
+    </>
+  );
 }
