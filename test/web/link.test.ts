@@ -15,7 +15,7 @@ function setup() {
     retryNow: vi.fn(),
     close: vi.fn(() => Promise.resolve()),
   };
-  const link = new Link("ws://test/devices/create?service=Create", () => subscription as never);
+  const link = new Link("ws://test/devices/create?service=Create", "create", () => subscription as never);
   const tell = (name: string, news: unknown): void => heard[name]?.(news as never);
   return { link, subscription, tell };
 }
@@ -92,7 +92,11 @@ describe("link", () => {
     const { link, tell } = setup();
     expect(link.state.value.kind).toBe("connecting");
     tell("connected", client);
-    expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_000, remote: { type: "a.B" } });
+    expect(link.state.value).toMatchObject({
+      kind: "online",
+      since: 1_000_000,
+      remote: { type: "a.B", device: "create" },
+    });
   });
   it("says since when it is lost, and when the next attempt begins, through all attempts", () => {
     const { link, tell } = setup();

@@ -20,15 +20,13 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-const controls: Remote["controls"] = new Map();
-
 /** An object whose wire is open, and says nothing. */
 const objectOf = (account: Account, of: Partial<Remote> = {}): Remote => {
   const wire = async function* (_: string, signal: AbortSignal, opened?: (account: Account) => void) {
     opened?.(account);
     await new Promise((resolve) => signal.addEventListener("abort", resolve));
   };
-  return { wire, path: "s", controls, ...of } as unknown as Remote;
+  return { wire, device: "d", path: "s", ...of } as unknown as Remote;
 };
 
 test("values of this page that were lost, and how long others waited, stand beside the sum of all clients", async () => {
@@ -36,7 +34,7 @@ test("values of this page that were lost, and how long others waited, stand besi
   const object = objectOf({ losses: () => Promise.resolve(losses) });
   const { close } = openFeed(object, "wire", "state");
   const place = { device: "d", service: "s", object: "" };
-  const update = show(StreamsPanel, { object, place } as PanelProps);
+  const update = show(StreamsPanel, { place } as PanelProps);
   await settle();
   await update();
   expect(text()).toContain("2 ms, 99 % 14 ms");
@@ -54,15 +52,12 @@ test("where no account is kept of them, none is told", async () => {
   close();
 });
 
-test("what all clients lost is told only of the object that lost it", async () => {
+test("what all clients lost is told only of the object that lost it, also of another service of the device", async () => {
   const none = { losses: () => Promise.reject(new Error("no")) };
-  const [root, child, other] = [
-    objectOf(none),
-    objectOf(none, { path: "s.arms[0]" }),
-    objectOf(none, { controls: new Map() }), // of another device
-  ];
+  const [root, child, other] = [objectOf(none), objectOf(none, { path: "s.arms[0]" }), objectOf(none, { device: "e" })];
   const feeds = [root, child, other].map((object) => openFeed(object, "wire", "state"));
-  const update = show(StreamsPanel, { object: root, place: { device: "d", service: "s", object: "" } } as PanelProps);
+  const object = objectOf(none, { path: "t", controls: new Map() }); // by a connection of its own
+  const update = show(StreamsPanel, { object, place: { device: "d", service: "t", object: "" } } as PanelProps);
   await settle();
   await update();
   const rows = [...document.querySelectorAll("tbody tr")].map((row) =>

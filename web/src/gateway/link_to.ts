@@ -13,7 +13,7 @@ export function linkTo(
   list: Pick<DeviceList, "answers">,
 ): { link: Link; dispose: () => void } {
   const url = relayUrl(device, service);
-  const link = new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url));
+  const link = new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url), device);
   const unwatch = list.answers.watch(follow(link, device));
   const dispose = (): void => {
     unwatch();

@@ -98,7 +98,7 @@ let opened: { link: Link; users: number } | null = null;
 
 /** One connection, however many panels look. */
 function openGateway(): { link: Link; close: () => void } {
-  opened ??= { link: new Link(() => session.withTicket(socketUrl("gateway", "gateway"))), users: 0 };
+  opened ??= { link: new Link(() => session.withTicket(socketUrl("gateway", "gateway")), "gateway"), users: 0 };
   const mine = opened;
   mine.users++;
   const close = (): void => {

@@ -20,7 +20,7 @@ type Losses = Awaited<ReturnType<NonNullable<Feed["account"]>["losses"]>>;
 
 const ACCOUNT_MS = 3_000;
 
-export default function StreamsPanel({ object, place }: PanelProps) {
+export default function StreamsPanel({ place }: PanelProps) {
   useNow(250);
   const list = useMemo(() => subscriptionsAt(place.device), [place.device]);
   useEffect(() => {
@@ -47,7 +47,7 @@ export default function StreamsPanel({ object, place }: PanelProps) {
           {openFeeds().map((feed, i) => {
             const age = feed.pace.ageMs(now);
             // The list is of the panel's device; another one may have an object of the same path.
-            const isOfList = feed.object.controls === object?.controls;
+            const isOfList = feed.object.device === place.device;
             const account = isOfList ? lost.filter((each) => isOf(each, feed)) : [];
             const missed = account.reduce((sum, { conflated, dropped }) => sum + conflated + dropped, 0);
             const here = own.get(feed);

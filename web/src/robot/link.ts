@@ -32,8 +32,12 @@ export class Link {
   #locks = new OwnLocks();
   #client: RemoteObject | null = null;
 
-  /** Starts connecting at once. `follow`: for tests. */
-  constructor(url: string | UrlSource, follow: typeof subscribe = subscribe) {
+  /** Starts connecting at once. `device`: whose service it is. `follow`: for tests. */
+  constructor(
+    url: string | UrlSource,
+    private readonly device: string,
+    follow: typeof subscribe = subscribe,
+  ) {
     this.#subscription = follow(url, LIMITS);
     this.#subscription.onConnected((client) => {
       this.#client = client;
@@ -67,7 +71,8 @@ export class Link {
 
   /** Anew for those who look: what they had asked the device for is gone. */
   #connect(client: RemoteObject): void {
-    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client, this.#controls, this.#locks) };
+    const remote = remoteOf(client, this.device, this.#controls, this.#locks);
+    this.state.value = { kind: "online", since: Date.now(), remote };
   }
 
   /** Rights to command are lost before anybody hears of it: who had them takes them again by hand. */

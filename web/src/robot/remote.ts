@@ -26,6 +26,8 @@ export type Account = Pick<WireConnection, "losses">;
 
 /** A connected object of a device. */
 export interface Remote {
+  /** The gateway's name of the device. */
+  readonly device: string;
   /** Qualified object type, such as `experimental.create.Create`. */
   readonly type: string;
   /** Such as `Create` or `Webcam.Webcams[0]`. */
@@ -99,6 +101,7 @@ export function isGenerator({ type, parameters }: Pick<Member, "type" | "paramet
 
 export function remoteOf(
   object: RemoteObject,
+  device = "",
   controls = new Map<string, Control>(),
   locks = new OwnLocks(),
   underWay = new UnderWay(),
@@ -111,6 +114,7 @@ export function remoteOf(
   };
   const children = new WeakMap<RemoteObject, Remote>(); // who asks for one again gets the same: what is known of it is kept by it
   return {
+    device,
     type: info.type,
     path: info.path,
     members: info.members,
@@ -173,7 +177,7 @@ export function remoteOf(
     onReleased: (released) => info.onClose(() => info.state === "released" && released()),
     child: async (name, index) => {
       const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
-      const child = children.get(found) ?? remoteOf(found, controls, locks, underWay);
+      const child = children.get(found) ?? remoteOf(found, device, controls, locks, underWay);
       children.set(found, child);
       return child;
     },
