@@ -1,6 +1,6 @@
 // rrgate-client/svelte with Svelte's own stores: one that derives from ours, and get().
 import { derived, get } from "svelte/store";
-import { subscribe, type OpenTransport } from "../../wasm-client/dist/node.js";
+import { ErrorCode, subscribe, type OpenTransport } from "../../wasm-client/dist/node.js";
 import { callStore, deviceStore, listen, propertyStore, wireStore } from "../../wasm-client/dist/svelte/svelte.js";
 import type { MemberState } from "../../wasm-client/dist/svelte/svelte.js";
 import { startDevice, until, url } from "./framework_device.js";
@@ -18,6 +18,22 @@ it("shows a device while somebody looks at it", async () => {
   await until(() => subscription?.isClosed === true);
   expect(get(device).client).toBeUndefined();
   expect(service.isClosed).toBe(true);
+});
+
+it("tells who waits for a device that is given up before it was there", async () => {
+  const { options } = await startDevice();
+  const never = () => new Promise<string>(() => undefined);
+  const giveUp = new AbortController();
+  const [ended, left] = [{ ...options, signal: giveUp.signal }, options].map((each) => deviceStore(never, each));
+  const stop = ended!.subscribe(() => undefined);
+  const { ready } = get(ended!);
+  giveUp.abort();
+  await expect(ready).rejects.toMatchObject({ code: ErrorCode.InvalidOperation });
+  stop();
+  const leave = left!.subscribe(() => undefined);
+  const waiting = get(left!).ready;
+  leave();
+  await expect(waiting).rejects.toMatchObject({ code: ErrorCode.InvalidOperation });
 });
 
 it("follows wires, properties, events and calls", async () => {

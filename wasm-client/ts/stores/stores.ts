@@ -27,7 +27,10 @@ export interface DeviceState<T = RemoteObject> {
   readonly client: Client<T> | undefined;
   readonly subscription: Subscription<T> | undefined;
   readonly state: SubscriptionState;
-  /** Settles with the first `client`; the same promise as long as the device is wanted. Never rejects. */
+  /**
+   * Settles with the first `client`; the same promise as long as the device is wanted. Rejects where it is given up before, by `signal`
+   * or because it is not wanted any more.
+   */
   readonly ready: Promise<Client<T>>;
 }
 
@@ -152,9 +155,10 @@ class LiveStore<T> implements View<T> {
 
 /** Connected while somebody looks. */
 export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOptions): View<DeviceState<T>> {
-  let [none, isReady] = unconnected<T>();
+  let [none, isReady, isOver] = unconnected<T>();
   const store: LiveStore<DeviceState<T>> = new LiveStore(none, () => {
     const subscription = subscribe<T>(urls, options);
+    subscription.client().catch(isOver);
     const stop = subscription.state.subscribe((state) => {
       const client = subscription.defaultClient;
       if (client) isReady(client);
@@ -162,7 +166,7 @@ export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: Subscribe
     });
     return () => {
       stop();
-      [none, isReady] = unconnected();
+      [none, isReady, isOver] = unconnected();
       store.show(none);
       void subscription.close();
     };
@@ -170,10 +174,12 @@ export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: Subscribe
   return store;
 }
 
-function unconnected<T>(): [DeviceState<T>, (client: Client<T>) => void] {
+function unconnected<T>(): [DeviceState<T>, (client: Client<T>) => void, (reason: unknown) => void] {
   let isReady!: (client: Client<T>) => void;
-  const ready = new Promise<Client<T>>((resolve) => (isReady = resolve));
-  return [{ client: undefined, subscription: undefined, state: { status: "connecting" }, ready }, isReady];
+  let isOver!: (reason: unknown) => void;
+  const ready = new Promise<Client<T>>((resolve, reject) => ([isReady, isOver] = [resolve, reject]));
+  ready.catch(() => undefined); // mostly nobody waits for it
+  return [{ client: undefined, subscription: undefined, state: { status: "connecting" }, ready }, isReady, isOver];
 }
 
 /** What a wire gave last, and whether that can still be so. */
