@@ -155,10 +155,23 @@ inEachEngine((at) => {
     demo.create.signal("SIGSTOP"); // calls hang from here on
     try {
       await visitor.press(button("Call Drive"));
+      await visitor.run(() => {
+        const said: string[] = [];
+        Object.assign(window, { said });
+        const look = () => said.push(document.querySelector<HTMLElement>("[data-stop]")?.dataset["stop"] ?? "");
+        new MutationObserver(look).observe(document, { attributeFilter: ["data-stop"], subtree: true });
+      });
       await visitor.press(button("Stop"));
-      await visitor.see({ css: '[data-stop="sent"]' });
+      // It waits for 2 s, which this test may miss on a busy machine.
+      const said = () => visitor.run(() => (window as unknown as { said: string[] }).said);
+      await expect.poll(said).toContain("sent");
     } finally {
       demo.create.signal("SIGCONT");
+    }
+    await visitor.see({ css: "[data-stop]" }, /^(arrived|NOT STOPPED)/);
+    // One that had waited for too long before the device went on has failed for good: each press sends again.
+    if (await visitor.run(() => document.querySelector('[data-stop="failed"]') !== null)) {
+      await visitor.press(button("Stop"));
     }
     await visitor.see({ css: '[data-stop="arrived"]' }, /^arrived after \d+ ms/);
     expect(await visitor.complaints()).toEqual([]);
@@ -180,17 +193,17 @@ inEachEngine((at) => {
     };
     const letGo = await drive();
     const hung = visitor.run(() => {
-      const until = Date.now() + 3_000;
+      const until = Date.now() + 10_000;
       while (Date.now() < until);
     });
-    await expect.poll(speed, { intervals: [50], timeout: 2_500 }).toBe(0);
+    await expect.poll(speed, { intervals: [50], timeout: 8_000 }).toBe(0);
     await hung;
     await visitor.see({ css: '[data-control="lost"]' }, /has not renewed it/);
     await letGo();
     expect(await visitor.complaints()).toEqual([]);
     await drive();
     await visitor.open("about:blank");
-    await expect.poll(speed, { intervals: [50], timeout: 2_000 }).toBe(0);
+    await expect.poll(speed, { intervals: [50], timeout: 10_000 }).toBe(0);
   });
 
   test("names and texts of a hostile service are shown among all members, and nothing of them runs", async () => {
