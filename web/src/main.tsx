@@ -36,6 +36,14 @@ access.start();
 const agents = new AgentsDesk(session);
 agents.start();
 
+// The code of a part of the page is asked for again where it did not come, but Vite asks for its stylesheet only once.
+const STYLE_PAUSE_MS = 2_000;
+const askAgain = ({ target }: Event): void => {
+  if (!(target instanceof HTMLLinkElement) || target.rel !== "stylesheet") return;
+  setTimeout(() => target.replaceWith(target.cloneNode()), STYLE_PAUSE_MS);
+};
+document.addEventListener("error", askAgain, { capture: true });
+
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
 const show = (): void =>

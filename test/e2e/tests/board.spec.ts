@@ -323,6 +323,20 @@ test("the stop reaches a device that the gateway takes for offline, and one with
   await expect(page.getByRole("region", { name: "Drive" })).toContainText("NOT STOPPED: offline");
 });
 
+test("a board whose code and style did not come has the Stop of the page, and is there with both once they come", async ({
+  page,
+  lab,
+}) => {
+  let isAway = true;
+  await page.route(/board_page-.*\.(js|css)/, (route) => (isAway ? route.abort() : route.continue()));
+  await page.goto(`${lab.url}#/devices/create/Create?view=board`);
+  await expect(page.getByRole("button", { name: "Load the page again" })).toBeVisible();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+  isAway = false;
+  await expect(page.locator(".board")).toHaveCSS("display", "grid");
+});
+
 test("a panel that fails says so, can be tried again, and leaves the rest of the board as it is", async ({
   page,
   lab,
