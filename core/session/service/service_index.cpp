@@ -39,14 +39,10 @@ class ServiceIndexObject : public ServiceObject {
   }
 };
 
-/// Read once for all nodes of the program: a gateway has one for each shared device.
-const std::shared_ptr<const TypeRegistry>& index_types() {
-  static const auto types = [] {
-    auto read = std::make_shared<TypeRegistry>();
-    // The text is our own: that it is valid is what the tests of this file prove.
-    if (!read->add({std::string(service_index_definition)}, RobdefMode::compat)) std::abort();
-    return std::shared_ptr<const TypeRegistry>(std::move(read));
-  }();
+std::shared_ptr<TypeRegistry> read_index_types() {
+  auto types = std::make_shared<TypeRegistry>();
+  // The text is our own: that it is valid is what the tests of this file prove.
+  if (!types->add({std::string(service_index_definition)}, RobdefMode::compat)) std::abort();
   return types;
 }
 
@@ -87,8 +83,9 @@ Value describe(const std::vector<KnownNode>& nodes, const std::function<bool(Ent
 }  // namespace
 
 std::shared_ptr<HostedService> make_service_index() {
-  auto service =
-      HostedService::make(std::string(service_index_name), std::make_shared<ServiceIndexObject>(), index_types());
+  // Once for all nodes of the program, of which a gateway has one for each shared device; for good.
+  static const auto& types = *new auto(read_index_types());
+  auto service = HostedService::make(std::string(service_index_name), std::make_shared<ServiceIndexObject>(), types);
   return std::move(service.value());
 }
 

@@ -449,18 +449,18 @@ object Leaf
     function int32 three()
 end
 object Root
-    objref Leaf leaf
+    objref Leaf{int32} leaves
 end
 )"},
                                           "large", "Root");
-  service->objref("leaf", [&](std::string_view) {
+  service->objref("leaves", [&](std::string_view) {
     auto leaf = service->make_object("Leaf");
     leaf->function("three", [] { return 3; });
     leaf->set_wire("trace", Value(std::vector<double>(1024 * 1024 / 8)));
     return leaf;
   });
   RunningNode node([&](Node& made) { made.add(service); }, std::move(options));
-  CHECK(rr::connect(node.url("large")).object("leaf").call("three") == Value(3));
+  CHECK(rr::connect(node.url("large")).object("leaves", "1").call("three") == Value(3));
 }
 
 TEST_CASE("objects are found by index and looked up anew when they are replaced") {
