@@ -32,7 +32,7 @@ const useStore = <T>(store: View<T>): T => useSyncExternalStore(store.subscribe,
  * A device, connected while the component is there.
  * @param urls     as for subscribe(). Another text means another device; a function or query has to stay the same one.
  * @param options  those of the first time count.
- * @returns  with `ready`, by which a component below, within <Suspense>, waits for the first connection: use(device.ready);
+ * @returns  with `ready`, by which a component below, within a Suspense boundary, waits for the first connection: use(device.ready);
  * the client of the moment is device.client.
  */
 export function useDevice<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOptions): DeviceState<T> {
