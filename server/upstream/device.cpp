@@ -246,8 +246,10 @@ rr::awaitable<void> Device::watch() {
     }
     is_circle_ = has_come_back_ && !result;
     if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);
-    // It has no room for another connection: the session that is open tells when it has gone.
-    waits_for_end_ = !result && sessions_ > 0 && identity_;
+    // It has no room for another connection: the session that is open tells when it has gone. One that can't prove any
+    // more who it is has room, and is not believed.
+    waits_for_end_ =
+        !result && result.error().code != rr::ErrorCode::authentication_error && sessions_ > 0 && identity_;
     if (waits_for_end_) result = *identity_;
     note(result);
     if (result) backoff_.reset();
