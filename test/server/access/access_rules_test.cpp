@@ -202,8 +202,8 @@ TEST_CASE("agents: what moves a device is given by rules for agents alone, and t
   CHECK_FALSE(ordinary.check(agent, drive));
   CHECK_FALSE(ordinary.terms(agent, drive));
 
-  const AccessRules rules({AccessRule{.roles = {"agent"}, .members = {"Drive"}, .may = {Verb::call}, .agent = {{}}}},
-                          true);
+  const AccessRules rules(
+      {AccessRule{.roles = {"agent"}, .members = {"Drive"}, .may = {Verb::call}, .agent = AgentTerms{}}}, true);
   CHECK(rules.check(agent, drive));
   REQUIRE(rules.terms(agent, drive));
   CHECK(rules.terms(agent, drive)->needs_approval);
