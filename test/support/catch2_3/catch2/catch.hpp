@@ -6,6 +6,7 @@
 namespace Catch {
 using Matchers::EndsWith;
 using Matchers::Equals;
+using Matchers::Matches;
 using Matchers::StartsWith;
 using Matchers::VectorContains;
 using TestEventListenerBase = EventListenerBase;
