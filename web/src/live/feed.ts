@@ -4,13 +4,11 @@
 import { explain } from "../robot/remote";
 import type { Account, Remote } from "../robot/remote";
 import { Pace } from "./pace";
-import { pause } from "./pause";
+import { pause, untilDone } from "./pause";
 
 export type FeedKind = "wire" | "pipe" | "property" | "event";
 
 const PROPERTY_MS = 500;
-const FIRST_RETRY_MS = 1_000;
-const LONGEST_RETRY_MS = 30_000;
 
 /** `isAfterGap`: it is the first, or those before it had become stale. */
 export type Heard = (value: unknown, now: number, isAfterGap: boolean) => void;
@@ -42,19 +40,17 @@ export class Feed {
   }
 
   /** What failed, or was closed, is tried again, more and more rarely until something comes. */
-  async #keepRunning(signal: AbortSignal): Promise<void> {
-    for (let waits = FIRST_RETRY_MS; !signal.aborted; waits = Math.min(LONGEST_RETRY_MS, waits * 2)) {
-      const before = this.pace.count;
-      try {
-        await this.#run(signal);
-        return;
-      } catch (error) {
-        if (signal.aborted) return;
-        this.failure = explain(error);
-      }
-      if (this.pace.count > before) waits = FIRST_RETRY_MS;
-      await pause(waits, signal);
-    }
+  #keepRunning(signal: AbortSignal): Promise<void> {
+    let before = 0;
+    const work = (): Promise<void> => {
+      before = this.pace.count;
+      return this.#run(signal);
+    };
+    const failed = (error: unknown): boolean => {
+      this.failure = explain(error);
+      return this.pace.count > before;
+    };
+    return untilDone(work, failed, signal);
   }
 
   async #run(signal: AbortSignal): Promise<void> {

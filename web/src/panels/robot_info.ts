@@ -2,12 +2,9 @@
 // Layer: web/panels. Source: com.robotraconteur.robotics.robot, robot_info.
 
 import { useEffect, useState } from "preact/hooks";
-import { pause } from "../live/pause";
+import { untilDone } from "../live/pause";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-
-const FIRST_RETRY_MS = 1_000;
-const LONGEST_RETRY_MS = 30_000;
 
 export interface RobotInfo {
   /** Of `object`, or of the last one while there is none; undefined: not known. */
@@ -24,22 +21,13 @@ export function useRobotInfo(object: Remote | null, isRobot: boolean): RobotInfo
   useEffect(() => {
     if (!object || !isRobot) return;
     const stop = new AbortController();
-    void keepReading(object, stop.signal, (next) => setFound({ ...next, object }));
+    const read = async (): Promise<void> => {
+      const info = await object.get("robot_info");
+      if (!stop.signal.aborted) setFound({ info, failure: null, object });
+    };
+    const failed = (error: unknown): void => setFound({ info: undefined, failure: explain(error), object });
+    void untilDone(read, failed, stop.signal);
     return () => stop.abort();
   }, [object, isRobot]);
   return object === null || found.object === object ? found : NOTHING;
-}
-
-async function keepReading(object: Remote, signal: AbortSignal, told: (info: RobotInfo) => void): Promise<void> {
-  for (let waits = FIRST_RETRY_MS; !signal.aborted; waits = Math.min(LONGEST_RETRY_MS, waits * 2)) {
-    try {
-      const info = await object.get("robot_info");
-      if (!signal.aborted) told({ info, failure: null });
-      return;
-    } catch (error) {
-      if (signal.aborted) return;
-      told({ info: undefined, failure: explain(error) });
-    }
-    await pause(waits, signal);
-  }
 }

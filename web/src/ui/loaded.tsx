@@ -5,11 +5,8 @@ import type { ComponentType } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
-import { pause } from "../live/pause";
+import { untilDone } from "../live/pause";
 import { Failure } from "./failure";
-
-const FIRST_PAUSE_MS = 1_000;
-const LONGEST_PAUSE_MS = 30_000;
 
 export type Loaded<Props> = ComponentType<Props> & {
   /** Whether the code is there; then for good. */
@@ -20,23 +17,17 @@ export type Loaded<Props> = ComponentType<Props> & {
 export function loaded<Props>(load: () => Promise<{ default: ComponentType<Props> }>): Loaded<Props> {
   let Shown: ComponentType<Props> | null = null;
   const isThere = new Store(false);
-  const follow = async (failed: () => void, gone: AbortSignal): Promise<void> => {
-    for (let wait = FIRST_PAUSE_MS; !isThere.value && !gone.aborted; wait = Math.min(2 * wait, LONGEST_PAUSE_MS)) {
-      try {
-        Shown = (await load()).default;
-        isThere.value = true;
-      } catch {
-        failed();
-        await pause(wait, gone);
-      }
-    }
+  const get = async (): Promise<void> => {
+    if (isThere.value) return;
+    Shown = (await load()).default;
+    isThere.value = true;
   };
   const Part: ComponentType<Props> = (props) => {
     useStore(isThere);
     const [hasFailed, setFailed] = useState(false);
     useEffect(() => {
       const gone = new AbortController();
-      void follow(() => setFailed(true), gone.signal);
+      void untilDone(get, () => setFailed(true), gone.signal);
       return () => gone.abort();
     }, []);
     if (Shown) return <Shown {...props} />;
