@@ -1,34 +1,19 @@
 // The board of an object over outages of its device.
 import { button, clear, enter, find, press, settle, show, text } from "./shown";
 import { memberOf } from "./members";
+import { remoteOf } from "./remotes";
 import { MOST_PANELS, packBoard, recallBoard } from "../../web/src/board/board";
 import type { Panel } from "../../web/src/board/board";
 import { Store } from "../../web/src/app/store";
 import BoardPage from "../../web/src/board/board_page";
 import type { BoardPageProps } from "../../web/src/board/board_page";
 import type { LinkState } from "../../web/src/robot/link";
-import { OwnLocks } from "../../web/src/robot/own_locks";
-import type { Member, Remote } from "../../web/src/robot/remote";
-import { UnderWay } from "../../web/src/robot/under_way";
+import type { Remote } from "../../web/src/robot/remote";
 
 vi.mock("../../web/src/gateway/link_to", () => ({
   linkTo: () => ({ link: { state: new Store<LinkState>({ kind: "connecting" }) }, dispose: () => undefined }),
 }));
 afterEach(clear);
-
-const remoteOf = (members: readonly Member[]) => ({
-  type: "a.b.Robot",
-  path: "Robot",
-  members,
-  definitions: ["service a.b\n"],
-  underWay: new UnderWay(),
-  locks: new OwnLocks(),
-  controls: new Map(),
-  onReleased: () => () => undefined,
-  lease: () => Promise.reject(new Error("none")),
-  ping: () => Promise.resolve(false),
-  urgent: vi.fn(() => Promise.resolve<unknown>(undefined)),
-});
 
 const online = (remote: ReturnType<typeof remoteOf>): LinkState => ({
   kind: "online",

@@ -1,11 +1,10 @@
 // Fields for values: what stands in them over an outage.
 import { clear, enter, find, press, settle, show } from "./shown";
+import { showPanel } from "./panels";
 import { ObjectView } from "../../web/src/pages/object_view";
 import type { ObjectViewProps } from "../../web/src/pages/object_view";
 import FormPanel from "../../web/src/panels/form_panel";
-import type { PanelProps } from "../../web/src/panels/panel";
 import type { Member, Remote } from "../../web/src/robot/remote";
-import { Definitions } from "../../web/src/values/definitions";
 
 afterEach(clear);
 
@@ -19,16 +18,7 @@ const memberOf = (of: Partial<Member>): Member => ({
   ...of,
 });
 
-const showForm = (object: Remote, member: Member) =>
-  show(FormPanel, {
-    object,
-    members: [member],
-    definitions: new Definitions([]),
-    scope: "",
-    place: { device: "d", service: "s", object: "" },
-    settings: {},
-    change: () => undefined,
-  } as unknown as PanelProps);
+const showForm = (object: Remote, member: Member) => showPanel(FormPanel, object, [member]);
 
 describe("a form of a property", () => {
   const connected = (value: number) => ({ get: () => Promise.resolve(value) }) as unknown as Remote;

@@ -1,24 +1,12 @@
 // What is typed in for generators and pipes, and what became of a run, over outages.
-import { clear, enter, find, press, settle, show, text } from "./shown";
+import { clear, enter, find, press, settle, text } from "./shown";
+import { showPanel } from "./panels";
 import { memberOf } from "./members";
 import GeneratorPanel from "../../web/src/panels/generator_panel";
-import type { PanelProps } from "../../web/src/panels/panel";
 import PipePanel from "../../web/src/panels/pipe_panel";
 import type { Member, Remote } from "../../web/src/robot/remote";
-import { Definitions } from "../../web/src/values/definitions";
 
 afterEach(clear);
-
-const showPanel = (panel: typeof GeneratorPanel, object: Remote, members: readonly Member[]) =>
-  show(panel, {
-    object,
-    members,
-    definitions: new Definitions([]),
-    scope: "",
-    place: { device: "d", service: "s", object: "" },
-    settings: {},
-    change: () => undefined,
-  } as unknown as PanelProps);
 
 const fields = () => [...document.querySelectorAll<HTMLInputElement>("input.field")];
 const type = async (...texts: string[]): Promise<void> => {

@@ -1,11 +1,10 @@
 // The stop of a service's page, whichever view is shown, and also before the view is loaded.
 import { button, clear, press, settle, show, text } from "./shown";
 import { memberOf } from "./members";
+import { remoteOf } from "./remotes";
 import { Store } from "../../web/src/app/store";
 import { ServicePage } from "../../web/src/pages/service_page";
 import type { ServicePageProps } from "../../web/src/pages/service_page";
-import { OwnLocks } from "../../web/src/robot/own_locks";
-import { UnderWay } from "../../web/src/robot/under_way";
 
 /** The code of the board, on its way. */
 const way = vi.hoisted(() => {
@@ -25,19 +24,7 @@ vi.mock("../../web/src/gateway/link_to", () => ({
 afterEach(clear);
 
 test("a board whose code is on its way has the stop of the page, until it has its own", async () => {
-  const urgent = vi.fn(() => Promise.resolve<unknown>(undefined));
-  const remote = {
-    type: "a.b.Robot",
-    path: "Robot",
-    members: [memberOf("function", "void", "halt")],
-    definitions: ["service a.b\n"],
-    underWay: new UnderWay(),
-    locks: new OwnLocks(),
-    controls: new Map(),
-    onReleased: () => () => undefined,
-    lease: () => Promise.reject(new Error("none")),
-    urgent,
-  };
+  const remote = remoteOf([memberOf("function", "void", "halt")]);
   means.link = { state: new Store({ kind: "online", since: 0, remote }), retryNow: () => undefined };
   const services = [{ name: "s", type: "a.b.Robot" }];
   const list = {
@@ -49,7 +36,7 @@ test("a board whose code is on its way has the stop of the page, until it has it
   expect(text()).not.toContain("the board");
   expect(text()).toContain("calls halt()");
   await press("Stop");
-  expect(urgent).toHaveBeenCalledWith("halt", [], expect.anything());
+  expect(remote.urgent).toHaveBeenCalledWith("halt", [], expect.anything());
   way.arrive();
   await vi.waitFor(() => expect(text()).toContain("the board, with its own stop"));
   expect(() => button("Stop")).toThrow("0 buttons");
