@@ -1,6 +1,7 @@
 // What agents do: read from whatever the gateway answers, kept while it is away, asked for only while shown.
 import { agentSessions, readAgentSessions } from "../../web/src/gateway/agent_sessions";
 import type { AgentSession } from "../../web/src/gateway/agent_sessions";
+import { polledPage } from "./polled";
 
 /** As the gateway writes it. */
 const written = {
@@ -77,34 +78,8 @@ describe("sessions of agents", () => {
 });
 
 describe("a list of sessions of agents", () => {
-  const answers: (Response | Error)[] = [];
-  const asked: string[] = [];
-  let page: { hidden: boolean; look: () => void };
-
-  beforeEach(() => {
-    vi.useFakeTimers();
-    answers.length = asked.length = 0;
-    page = { hidden: false, look: () => undefined };
-    vi.stubGlobal("document", {
-      baseURI: "https://host/robots/",
-      get hidden() {
-        return page.hidden;
-      },
-      addEventListener: (_: string, listener: () => void) => (page.look = listener),
-      removeEventListener: () => (page.look = () => undefined),
-    });
-    vi.stubGlobal("fetch", async (url: URL) => {
-      if (!url.pathname.endsWith("/sessions")) throw new TypeError("fetch failed"); // who is signed in, after a 401
-      asked.push(url.href);
-      const answer = answers.shift() ?? new TypeError("fetch failed");
-      if (answer instanceof Error) throw answer;
-      return answer;
-    });
-  });
-  afterEach(() => {
-    vi.useRealTimers();
-    vi.unstubAllGlobals();
-  });
+  const page = polledPage("/sessions"); // and not who is signed in, after a 401
+  const { answers, asked } = page;
 
   it("is asked again every 2 s, and no more once it is closed", async () => {
     vi.setSystemTime(100_000);

@@ -4,6 +4,7 @@ import type { Polled } from "../../web/src/gateway/polled_list";
 import { readSubscriptions, subscriptionsAt } from "../../web/src/gateway/subscriptions";
 import type { Subscription } from "../../web/src/gateway/subscriptions";
 import { ageText } from "../../web/src/ui/words";
+import { polledPage } from "./polled";
 
 const frames: Subscription = {
   client: "192.0.2.1:5",
@@ -56,33 +57,8 @@ describe("subscriptions", () => {
 });
 
 describe("a list of subscriptions", () => {
-  const answers: (Response | Error)[] = [];
-  const asked: string[] = [];
-  let page: { hidden: boolean; look: () => void };
-
-  beforeEach(() => {
-    vi.useFakeTimers();
-    answers.length = asked.length = 0;
-    page = { hidden: false, look: () => undefined };
-    vi.stubGlobal("document", {
-      baseURI: "https://host/robots/",
-      get hidden() {
-        return page.hidden;
-      },
-      addEventListener: (_: string, listener: () => void) => (page.look = listener),
-      removeEventListener: () => (page.look = () => undefined),
-    });
-    vi.stubGlobal("fetch", async (url: URL) => {
-      asked.push(url.href);
-      const answer = answers.shift() ?? new TypeError("fetch failed");
-      if (answer instanceof Error) throw answer;
-      return answer;
-    });
-  });
-  afterEach(() => {
-    vi.useRealTimers();
-    vi.unstubAllGlobals();
-  });
+  const page = polledPage();
+  const { answers, asked } = page;
 
   it("is asked again every 3 s, and no more once it is closed", async () => {
     answers.push(Response.json({ subscriptions: [written(frames)] }), Response.json({ subscriptions: [] }));
