@@ -143,7 +143,7 @@ void Object::check_arguments(const MemberDefinition& member, const char* verb, s
 }
 
 void Object::check_size(const MemberDefinition& member, const Message& packed) const {
-  if (!service_.host_ || paths().empty()) return;  // nobody has it
+  if (!service_.host_) return;
   const auto bytes = payload_bytes(packed);
   if (const auto limit = service_.host_->max_message_size(); bytes >= limit)
     refuse(type_name() + "." + member.name + ": " + std::to_string(bytes) +
@@ -169,7 +169,8 @@ void Object::call_callback(ClientId client, std::string_view callback, const std
   service_.host_->call_callback(service_, client, paths(), member, arguments, std::move(done));
 }
 
-WirePacket Object::pack_in_value(std::string_view wire, const Value& value, std::optional<TimeSpec> time) const {
+WirePacket Object::pack_in_value(std::string_view wire, const Value& value, const std::vector<std::string>& paths,
+                                 std::optional<TimeSpec> time) const {
   const MemberDefinition& member = require_member(wire, MemberKind::wire);
   if (member.direction() == MemberDirection::writeonly)
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
@@ -177,7 +178,7 @@ WirePacket Object::pack_in_value(std::string_view wire, const Value& value, std:
   WirePacket packet({}, member, value, time.value_or(now.utc), now.steady);
   const auto packed = packet.message(*service_.types_);
   if (!packed) refuse(type_name() + "." + member.name + ": " + packed.error().message);
-  check_size(member, (*packed)->message);
+  if (!paths.empty()) check_size(member, (*packed)->message);  // else nobody has it
   return packet;
 }
 
@@ -191,13 +192,14 @@ void Object::set_wire(std::string_view wire, Value value, TimeSpec time) {
 
 void Object::set_in_value(std::string_view wire, Value value, std::optional<TimeSpec> time) {
   auto newest = std::make_shared<const Value>(std::move(value));
-  WirePacket packet = pack_in_value(wire, *newest, time);
+  const auto paths = this->paths();
+  WirePacket packet = pack_in_value(wire, *newest, paths, time);
   Member& mine = members_[&packet.member()];
   mine.own_in_values.clear();
   mine.in_time = time;
   mine.in_value = newest;
   if (!service_.host_) return;
-  for (const std::string& path : paths()) {
+  for (const std::string& path : paths) {
     // Meanwhile a handler may have set another, or ended the node.
     if (mine.in_value != newest || !service_.host_) return;
     packet.set_path(path);
@@ -213,11 +215,12 @@ void Object::reset_wire(std::string_view wire) {
 }
 
 void Object::set_wire_for(ClientId client, std::string_view wire, Value value) {
-  WirePacket packet = pack_in_value(wire, value);
+  const auto paths = this->paths();
+  WirePacket packet = pack_in_value(wire, value, paths);
   if (service_.find_client(client).id == 0) return;
   members_[&packet.member()].own_in_values.insert_or_assign(client, value);
   service_.objects_of_clients_[client].insert(weak_from_this());
-  for (const std::string& path : paths()) {
+  for (const std::string& path : paths) {
     if (!service_.host_) return;
     packet.set_path(path);
     service_.host_->send_wire_to(client, packet);

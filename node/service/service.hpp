@@ -256,8 +256,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
   void close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler);
-  /// Throws as set_wire().
-  WirePacket pack_in_value(std::string_view wire, const Value& value, std::optional<TimeSpec> time = {}) const;
+  /// `paths`  of this object. Throws as set_wire().
+  WirePacket pack_in_value(std::string_view wire, const Value& value, const std::vector<std::string>& paths,
+                           std::optional<TimeSpec> time = {}) const;
   void set_in_value(std::string_view wire, Value value, std::optional<TimeSpec> time);
   const Value* in_value(const MemberDefinition& wire, ClientId client) const;
   /// Of in_value(), where it is known.

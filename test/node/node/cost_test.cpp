@@ -71,15 +71,19 @@ class Plant {
     client.call("plant", "nothing", {}, [&](const Result<Value>& result) { is_done = result.has_value(); });
     while (!is_done && io_.run_one() > 0) continue;
   }
+  std::string find_part(ClientConnection& client, std::size_t index) {
+    const auto path = "plant.parts[" + std::to_string(index) + "]";
+    std::optional<Result<Value>> found;
+    client.find_object(path, [&](Result<Value> result) { found = std::move(result); });
+    run_until([&] { return found.has_value(); });
+    REQUIRE(found->has_value());
+    return path;
+  }
   /// Finds so many objects, and connects the wire of each.
   void follow_parts(ClientConnection& client, std::size_t count) {
     std::size_t joined = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto path = "plant.parts[" + std::to_string(i) + "]";
-      std::optional<Result<Value>> found;
-      client.find_object(path, [&](Result<Value> result) { found = std::move(result); });
-      run_until([&] { return found.has_value(); });
-      REQUIRE(found->has_value());
+      const auto path = find_part(client, i);
       client.connect_wire(
           path, "level",
           [this](const Value& value, TimeSpec) {
@@ -142,6 +146,17 @@ TEST_CASE("a value of one object costs the same where its client follows 4,000 o
   full.values = 0;
   set_and_wait(*full.parts.back(), -2.0);
   CHECK(full.values == 1);
+}
+
+TEST_CASE("a value of a wire costs no more than one text for each path of its object") {
+  Plant plant;
+  auto& client = plant.connect();
+  const auto part = plant.service->make_object("Part");
+  plant.service->objref("parts", [&](std::string_view) { return part; });
+  plant.find_part(client, 1000);
+  const auto by_one = cost_of(*part);
+  for (std::size_t i = 1; i <= 64; ++i) plant.find_part(client, 1000 + i);
+  CHECK((cost_of(*part) - by_one) / 100 < 2 * 64);
 }
 
 TEST_CASE("an empty call allocates less than twice on both sides together, once a few were made") {
