@@ -55,6 +55,7 @@ def slow_handlers(build):
             with relay.gateway(build, service, mode=mode) as gateway:
                 at = f"rr+ws://127.0.0.1:{gateway}/devices/device?service=interop"
                 yield on(CORES[0], bench / "bench_slow", f"{SLOW}, gateway ({mode})", at)
+                yield [sys.executable, HERE / "slow_web.py", f"{SLOW}, gateway ({mode})", gateway]
 
 
 def on(core, *command):
