@@ -64,7 +64,7 @@ Result<std::string> check_url(std::string_view text, const NodeId& node_id, cons
   if (!is_credible(*address, source))
     return refused("URL " + quote(text, 200) + ": its address does not belong to the sender's network");
   // A zone that came with the packet is the sender's name for the link, not ours.
-  url->host.resize(std::min(url->host.size(), url->host.find('%')));
+  url->host.resize(without_zone(url->host).size());
   if (address->is_v6 && address->is_link_local() && !source.zone.empty()) url->host += "%" + source.zone;
   return format_url(*url);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/session/url.hpp"
 #include "core/support/hex.hpp"
 
 namespace rr {
@@ -98,7 +99,7 @@ std::optional<IpAddress> parse_ip_address(std::string_view text) {
 }
 
 std::optional<IpAddress> parse_url_address(std::string_view host) {
-  return parse_ip_address(host.substr(0, host.find('%')));
+  return parse_ip_address(without_zone(host));
 }
 
 }  // namespace rr

@@ -268,6 +268,10 @@ std::string format_url(const ConnectionUrl& url) {
   return out;
 }
 
+std::string_view without_zone(std::string_view host) {
+  return host.substr(0, host.find('%'));
+}
+
 std::string format_host_port(std::string_view host, std::uint16_t port) {
   const bool is_v6 = host.find(':') != std::string_view::npos;
   return (is_v6 ? "[" + std::string(host) + "]" : std::string(host)) + ":" + std::to_string(port);

@@ -56,6 +56,9 @@ enum class ServiceInUrl { required, optional };
 /// Canonical text: the port is written unless it is the default, the query as it was received.
 std::string format_url(const ConnectionUrl& url);
 
+/// The host of a URL without the zone of an IPv6 address, which means something on this machine alone. Borrows `host`.
+std::string_view without_zone(std::string_view host);
+
 /// "host:port" with brackets around IPv6.
 std::string format_host_port(std::string_view host, std::uint16_t port);
 

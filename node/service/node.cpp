@@ -212,11 +212,10 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     error_code error;
     const auto local = socket.local_endpoint(error);
     if (error || is_stopping_ || is_full()) return;  // an error: gone already
-    std::string host = local.address().to_string();
-    host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
+    const auto host = local.address().to_string();
     auto stream = make_tcp_stream(std::move(socket), send_stall);
     stream->put_back(seen);
-    welcome(std::move(stream), {{}, format_host_port(host, local.port()), requires_tls});
+    welcome(std::move(stream), {{}, format_host_port(without_zone(host), local.port()), requires_tls});
   }
 
   void every(std::chrono::nanoseconds period, std::function<void()> work) {

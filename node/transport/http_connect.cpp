@@ -122,8 +122,7 @@ awaitable<Result<std::unique_ptr<ByteStream>>> connect_websocket(std::unique_ptr
   const auto* scheme = find_url_scheme(url.scheme);
   const bool is_default_port = scheme != nullptr && scheme->default_port == url.port;
   const std::string host_port = format_host_port(url.host, url.port);
-  // Without the zone, which means something on this machine alone.
-  const std::string named = format_host_port(url.host.substr(0, url.host.find('%')), url.port);
+  const std::string named = format_host_port(without_zone(url.host), url.port);
   const std::string host = is_default_port ? named.substr(0, named.rfind(':')) : named;
   const std::string what = "WebSocket to " + host_port;
   const std::string key = make_key();

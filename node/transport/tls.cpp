@@ -5,6 +5,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "core/session/url.hpp"
 #include "node/tls/openssl.hpp"
 #include "node/tls/revocations.hpp"
 
@@ -94,7 +95,7 @@ TlsStream::~TlsStream() = default;
 
 /// Asks for the certificate of this host, and takes no other's. The zone is no part of its name.
 bool TlsStream::set_host(const std::string& zoned_host) {
-  const auto host = zoned_host.substr(0, zoned_host.find('%'));
+  const std::string host(without_zone(zoned_host));
   X509_VERIFY_PARAM* const parameters = SSL_get0_param(ssl_.get());
   if (X509_VERIFY_PARAM_set1_ip_asc(parameters, host.c_str()) == 1) return true;
   ERR_clear_error();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/session/url.hpp"
 #include "core/wire/codec.hpp"
 #include "core/wire/frame_scanner.hpp"
 #include "node/transport/watchdog.hpp"
@@ -128,8 +129,8 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
     refusal = allowed.error();
     is_denied = true;
   } else if (destination && destination->node) {
-    auto base_url =
-        "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port()) + "/";
+    const auto host = connection.local.address().to_string();
+    auto base_url = "rr+tcp://" + rr::format_host_port(rr::without_zone(host), connection.local.port()) + "/";
     co_return serve_shared_client(gateway, connection, *destination, std::move(stream), std::move(base_url));
   } else if (destination) {
     auto boarding = co_await board(gateway, connection, *destination->device);

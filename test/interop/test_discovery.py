@@ -172,6 +172,18 @@ def test_a_subscription_by_url_outlives_the_service(network, start):
     assert watch.wait_for(subscribed("connected", IDS[3]), seconds=10)["one"] == 1
 
 
+def test_the_index_of_a_gateway_names_its_address_without_the_zone(network, start, tmp_path):
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": ["[::]:8080"], "insecure": True, "devices": [
+        {"name": "away", "url": "rr+tcp://127.0.0.1:1/?service=thing", "mode": "shared"}]}))
+    gateway = start(0, BUILD / "server" / "rrgate", "serve", "--config", config)
+    gateway.wait_until(lambda: "listening" in gateway.description())
+    index = f"rr+tcp://[{network.link_local(0)}%eth0]:8080/?service=RobotRaconteurServiceIndex"
+    (node,) = search(network, 1, BUILD / "server" / "rrgate", "call", index, "GetRoutedNodes", "--json").values()
+    (url,) = node["ServiceIndexConnectionURL"].values()
+    assert url.startswith(f"rr+tcp://[{network.link_local(0)}]:8080/?nodeid=")
+
+
 def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_path):
     config = tmp_path / "gateway.json"
     config.write_text(json.dumps({"listen": ["127.0.0.1:8080"], "devices": [], "retry": {"min_ms": 100, "online_ms": 1000},

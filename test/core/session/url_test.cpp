@@ -72,6 +72,14 @@ TEST_CASE("an IPv6 zone is accepted raw and in URI form and kept raw") {
   CHECK(parsed("rr+tcp://[fe80::1%4]:1?service=a").host == "fe80::1%4");
 }
 
+TEST_CASE("a host without its zone is the address alone, and any other host as it is") {
+  CHECK(without_zone("fe80::1%eth0") == "fe80::1");
+  CHECK(without_zone("fe80::1%") == "fe80::1");
+  CHECK(without_zone("fe80::1") == "fe80::1");
+  CHECK(without_zone("robot.local") == "robot.local");
+  CHECK(without_zone("") == "");
+}
+
 TEST_CASE("the legacy form is understood") {
   auto url = parsed("tcp://10.0.0.1:2355/my.robot/Create/");
   CHECK(url.scheme == "rr+tcp");
