@@ -158,25 +158,39 @@ bool is_port_free(std::uint16_t port) {
 }
 
 /// Free at this moment: the device binds it a moment later, and once more whenever it starts again. So it is none of
-/// those that the system gives to connections.
-std::uint16_t find_free_port(const std::vector<DemoDevice>& devices) {
+/// those that the system gives to connections. `wanted`  is taken where it is one of these.
+std::uint16_t find_free_port(const std::vector<DemoDevice>& devices, int wanted) {
   constexpr std::uint16_t first = 10'000;
   constexpr std::uint16_t end = 32'768;
-  for (;;) {
-    const auto port = static_cast<std::uint16_t>(first + rr::random_u32() % (end - first));
+  for (;; wanted = static_cast<int>(first + rr::random_u32() % (end - first))) {
+    if (wanted < first || wanted >= end) continue;
+    const auto port = static_cast<std::uint16_t>(wanted);
     const bool is_taken =
         std::any_of(devices.begin(), devices.end(), [&](const auto& each) { return each.port == port; });
     if (!is_taken && is_port_free(port)) return port;
   }
 }
 
+/// Those of a program that has any number of nodes are ranges, "20000-24999": few words, however many there are.
+void add_port(DemoDevice& program, int before, std::uint16_t port) {
+  auto& arguments = program.arguments;
+  if (!program.is_any_number || arguments.empty() || port != before + 1) {
+    arguments.insert(arguments.end(), {"--port", std::to_string(port)});
+  } else {
+    auto& range = arguments.back();
+    range = range.substr(0, range.find('-')) + "-" + std::to_string(port);
+  }
+}
+
 /// Where each device is to listen, and the command lines that say so. Returns the program that is not there, if any.
 std::string prepare_programs(std::vector<DemoDevice>& devices) {
   DemoDevice* program = nullptr;
+  int before = 0;
   for (auto& device : devices) {
     if (!device.program.empty()) program = &device;
-    device.port = find_free_port(devices);
-    program->arguments.insert(program->arguments.end(), {"--port", std::to_string(device.port)});
+    device.port = find_free_port(devices, program->is_any_number ? before + 1 : 0);
+    add_port(*program, before, device.port);
+    before = device.port;
     if (program != &device) continue;
     device.path = find_program(device.program);
     if (device.path.empty()) return std::string(device.program);

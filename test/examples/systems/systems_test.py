@@ -5,7 +5,9 @@ systems_test.py BUILD_DIR
 import base64
 import json
 import os
+import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -220,6 +222,19 @@ class MoreDevices(unittest.TestCase):
         self.assertIn("expected -10 to 10", ran("set", last, "offset", "11").stderr)
         for others in (["robots", "--count", "2"], ["fleet", "--count", "0"]):
             self.assertIn("--count", ran("demo", *others).stderr)
+
+    def test_a_fleet_that_has_ended_is_started_again_by_what_the_log_says(self):
+        gateway = Program(self, RRGATE, "demo", "fleet", "--port", 0, "--count", 300)
+        self.addCleanup(gateway.process.terminate)
+        last = gateway.url("rrgate demo: http://127") + "devices/sensor-300?service=Sensor"
+        (fleet,) = Path(f"/proc/{gateway.process.pid}/task/{gateway.process.pid}/children").read_text().split()
+        os.kill(int(fleet), signal.SIGKILL)
+        wait_for(lambda: "by hand" in gateway.said())
+        command, rest = re.search("command='([^']*)'(.*)", gateway.said()).groups()
+        self.assertEqual(rest, "")  # it is told whole
+        wait_for(lambda: ran("get", last, "number").returncode != 0)
+        Program(self, *command.split())
+        wait_for(lambda: ran("get", last, "number").stdout == "300\n")
 
 
 if __name__ == "__main__":
