@@ -78,6 +78,11 @@ Error lost(std::string what) {
   return {ErrorCode::connection_error, std::move(what)};
 }
 
+Error closed_by(const ByteStream& peer) {
+  const auto reason = peer.peer_reason();
+  return lost("closed the connection without an answer" + (reason.empty() ? std::string() : ": " + reason));
+}
+
 }  // namespace
 
 bool ServiceInfo::implements(std::string_view type) const {
@@ -132,7 +137,7 @@ awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOp
     else if (read.error)
       session.handle_closed(lost(read.error.message()), read_clocks());
     else if (read.is_end())
-      session.handle_closed(lost("closed the connection without an answer"), read_clocks());
+      session.handle_closed(closed_by(stream), read_clocks());
     else
       session.handle_bytes(ByteSpan(buffer.data(), read.bytes), read_clocks());
   }

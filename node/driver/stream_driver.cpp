@@ -23,6 +23,14 @@ Error stream_error(const error_code& error) {
   return make_error(ErrorCode::connection_error, "connection lost: " + error.message());
 }
 
+/// What a stream has ended by that can't be read any more. `error`  none: in good order.
+Error end_of_stream(const ByteStream& stream, const error_code& error) {
+  const auto reason = stream.peer_reason();
+  if (error && reason.empty()) return stream_error(error);
+  return make_error(ErrorCode::connection_error,
+                    "the peer closed the connection" + (reason.empty() ? std::string() : ": " + reason));
+}
+
 std::string text_of(const std::exception_ptr& thrown) {
   try {
     std::rethrow_exception(thrown);
@@ -56,9 +64,7 @@ awaitable<void> StreamDriver::read_all(std::shared_ptr<StreamDriver> self) {
     const auto read = co_await driver.stream_->read_some(room);
     if (driver.is_closed_) break;
     const Now now = read_clocks();
-    if (read.error) co_return driver.finish(stream_error(read.error), now);
-    if (read.is_end())
-      co_return driver.finish(make_error(ErrorCode::connection_error, "the peer closed the connection"), now);
+    if (read.error || read.is_end()) co_return driver.finish(end_of_stream(*driver.stream_, read.error), now);
     driver.buffer_.note_read(read.bytes);
     driver.unread_ = room.first(read.bytes);
     driver.settle(now);

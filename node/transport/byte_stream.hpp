@@ -73,6 +73,8 @@ class ByteStream {
   virtual std::string peer() const = 0;
   /// The node that the peer has proved to be by its certificate; any without such a proof.
   virtual NodeId verified_peer() const { return {}; }
+  /// Why the peer has ended its side, in words for people, where it has said so; else empty.
+  virtual std::string peer_reason() const { return {}; }
   virtual boost::asio::any_io_executor executor() = 0;
 
   /// The next reads return these bytes first: what was read to find out which protocol the peer speaks.

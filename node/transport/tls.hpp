@@ -44,6 +44,7 @@ class TlsStream final : public ByteStream {
   awaitable<void> end(const EndReason& reason) override;
   void close() override { inner_->close(); }
   std::string peer() const override { return inner_->peer(); }
+  std::string peer_reason() const override { return inner_->peer_reason(); }
   NodeId verified_peer() const override { return check_.found; }
   boost::asio::any_io_executor executor() override { return inner_->executor(); }
 

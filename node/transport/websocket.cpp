@@ -107,6 +107,14 @@ void WebSocketStream::close() {
   written_.cancel();
 }
 
+std::string WebSocketStream::peer_reason() const {
+  const auto& received = decoder_.received_close();
+  if (!received) return {};
+  const auto& [code, reason] = *received;
+  if (!reason.empty()) return "code " + std::to_string(code) + ", " + quote(reason, 123);
+  return code == 1000 || code == 1005 ? std::string() : "code " + std::to_string(code);
+}
+
 awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   const auto& received = decoder_.received_close();

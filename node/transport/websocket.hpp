@@ -27,6 +27,8 @@ class WebSocketStream final : public ByteStream {
   awaitable<void> end(const EndReason& reason) override;
   void close() override;
   std::string peer() const override { return inner_->peer(); }
+  /// Of its close frame: "code 1008, 'not allowed'". A plain end has none.
+  std::string peer_reason() const override;
   boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
  private:

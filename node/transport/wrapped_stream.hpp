@@ -22,6 +22,7 @@ class WrappedStream : public ByteStream {
   awaitable<void> end(const EndReason& reason) override { return inner_->end(reason); }
   void close() override { inner_->close(); }
   std::string peer() const override { return inner_->peer(); }
+  std::string peer_reason() const override { return inner_->peer_reason(); }
   boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
  protected:

@@ -142,13 +142,19 @@ rr::awaitable<void> Relay::keep_pace(Direction& direction, std::size_t bytes) {
 
 void Relay::end_of(Direction& direction, rr::error_code error) {
   if (direction.is_from_device) {
-    stop(error ? lost_device(error) : rr::EndReason{1000, "device closed the connection"});
+    stop(end_of_device(error));
   } else if (error) {
     stop(lost_client(1000, error));
   } else if (!end_reason_) {
     device_.finish_sending();
     half_closed_limit_.arm(half_closed_time);
   }
+}
+
+rr::EndReason Relay::end_of_device(rr::error_code error) const {
+  const auto reason = device_.peer_reason();
+  if (error && reason.empty()) return lost_device(error);
+  return {1000, "device closed the connection" + (reason.empty() ? std::string() : ": " + reason)};
 }
 
 rr::EndReason Relay::broken_rule(const Direction& direction, const rr::Error& error) const {

@@ -57,6 +57,7 @@ class Relay {
   rr::awaitable<void> pump_all(Direction& direction);
   rr::awaitable<void> keep_pace(Direction& direction, std::size_t bytes);
   void end_of(Direction& direction, rr::error_code error);
+  rr::EndReason end_of_device(rr::error_code error) const;
   rr::EndReason broken_rule(const Direction& direction, const rr::Error& error) const;
 
   rr::ByteStream& client_;

@@ -9,6 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/session/start_tls.hpp"
+#include "node/transport/websocket.hpp"
 #include "test/node/transport/memory_stream.hpp"
 
 using namespace rrgate;
@@ -138,6 +139,23 @@ TEST_CASE("while one side takes nothing, the relay takes no more from the other 
   device.server->close();
   io.restart();
   io.run();
+}
+
+TEST_CASE("a relay ends by what the device says when it closes its WebSocket") {
+  boost::asio::io_context io(1);
+  rr::test::MemoryStreams client(io.get_executor());
+  rr::test::MemoryStreams device(io.get_executor());
+  rr::WebSocketStream to_device(std::move(device.client), rr::WebSocketRole::client, false);
+  rr::WebSocketStream at_device(std::move(device.server), rr::WebSocketRole::server, true);
+  Traffic traffic;
+  MemoryBudget budget(1'000'000);
+  Relay relay(*client.server, to_device, {5'000'000, 20'000, 1'000'000'000}, traffic, budget.charge("client"));
+  std::string text;
+  boost::asio::co_spawn(io, relay.run(), [&](std::exception_ptr, const rr::EndReason& why) { text = why.text; });
+  const rr::EndReason reason{1008, "not allowed"};
+  boost::asio::co_spawn(io, at_device.end(reason), boost::asio::detached);
+  io.run();
+  CHECK(text == "device closed the connection: code 1008, 'not allowed'");
 }
 
 TEST_CASE("a direction without memory ends the relay, and the other direction with it") {

@@ -1,13 +1,19 @@
 // WebSockets at nodes: our client and raw HTTP against our node, and the way through a proxy.
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/asio/write.hpp>
 #include <catch2/catch.hpp>
+#include <optional>
 #include <thread>
 
 #include "node/client/client.hpp"
+#include "node/client/client_connection.hpp"
 #include "node/transport/dial.hpp"
+#include "node/transport/websocket.hpp"
 #include "test/node/node/node_fixture.hpp"
+#include "test/node/transport/memory_stream.hpp"
 
 using namespace rr;
 namespace asio = boost::asio;
@@ -169,6 +175,29 @@ TEST_CASE("a WebSocket to what is none says what came instead") {
   CHECK_THAT(error.message, EndsWith(told));
   CHECK_THAT(request, StartsWith("GET /robots/a?token=1&service=Blocks HTTP/1.1\r\n"));
   CHECK_THAT(request, Contains("\r\nAuthorization: Bearer 1\r\n"));
+}
+
+TEST_CASE("a connection ends by what the peer says when it closes the WebSocket") {
+  const auto [reason, text] = GENERATE(table<EndReason, std::string>({
+      {{1008, "not allowed"}, "the peer closed the connection: code 1008, 'not allowed'"},
+      {{1001, ""}, "the peer closed the connection: code 1001"},
+      {{1000, ""}, "the peer closed the connection"},
+  }));
+  asio::io_context io;
+  test::MemoryStreams streams{io.get_executor()};
+  std::optional<Error> failure;
+  ClientConnection::open(std::make_unique<WebSocketStream>(std::move(streams.client), WebSocketRole::client, false), {},
+                         [&](const Result<std::shared_ptr<ClientConnection>>& opened) { failure = opened.error(); });
+  WebSocketStream server(std::move(streams.server), WebSocketRole::server, true);
+  auto work = [](WebSocketStream& stream, const EndReason& why) -> awaitable<void> {
+    Bytes buffer(10'000);
+    co_await stream.read_some(buffer);
+    co_await stream.end(why);
+  };
+  asio::co_spawn(io, work(server, reason), asio::detached);
+  io.run_for(std::chrono::seconds(20));
+  REQUIRE(failure.has_value());
+  CHECK(failure->message == text);
 }
 
 TEST_CASE("a proxy leads to the node, or says why not") {
