@@ -8,7 +8,10 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::size_t header_chunk = 2048;
+/// A header is read in parts as long as what is there of it, within these: who sends the beginning of one, or nothing
+/// yet, has the gateway hold little more.
+constexpr std::size_t least_header_chunk = 512;
+constexpr std::size_t most_header_chunk = 2048;
 constexpr std::size_t body_chunk = 4096;
 
 ReadFailure failure_of(const boost::beast::error_code& error, const RequestLimits& limits, std::size_t body_limit) {
@@ -88,6 +91,13 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on(std::size_t chu
                                  " bytes a second"};
 }
 
+ReadRequest RequestReader::take() {
+  auto request = std::make_unique<HttpRequest>(HttpRequest{std::move(parser_->get())});
+  if (auto failure = check_header(*request)) return {nullptr, std::move(*failure)};
+  if (parser_->is_done()) parser_.reset();
+  return {std::move(request)};
+}
+
 rr::awaitable<ReadRequest> RequestReader::next() {
   if (has_unread_body()) co_return ReadRequest();
   auto& parser = parser_.emplace();
@@ -104,24 +114,18 @@ rr::awaitable<ReadRequest> RequestReader::next() {
     if (!error && !buffer_.empty()) consumed += parse(parser, buffer_, error);
     if (error) {
       limit_.disarm();
-      co_return ReadRequest{std::nullopt, failure_of(error, limits_, limits_.body_bytes)};
+      co_return ReadRequest{nullptr, failure_of(error, limits_, limits_.body_bytes)};
     }
     if (parser.is_header_done()) break;
-    auto failure = co_await read_on(header_chunk);
+    const auto chunk = std::clamp(consumed + buffer_.size(), least_header_chunk, most_header_chunk);
+    auto failure = co_await read_on(chunk);
     // One that sends nothing is idle, not late.
     if (failure && !is_started) failure = ReadFailure();
-    if (failure) co_return ReadRequest{std::nullopt, std::move(*failure)};
+    if (failure) co_return ReadRequest{nullptr, std::move(*failure)};
     if (!std::exchange(is_started, true)) arm(limits_.header_timeout);
   }
   limit_.disarm();
-  ReadRequest out;
-  out.request.emplace(HttpRequest{std::move(parser.get())});
-  if (auto failure = check_header(*out.request)) {
-    out = ReadRequest{std::nullopt, std::move(*failure)};
-  } else if (parser.is_done()) {
-    parser_.reset();
-  }
-  co_return out;
+  co_return take();
 }
 
 rr::awaitable<std::optional<ReadFailure>> RequestReader::read_body(HttpRequest& request, const HasRoom& has_room,

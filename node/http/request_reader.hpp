@@ -5,6 +5,7 @@
 #include <boost/beast/http/parser.hpp>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "node/http/message.hpp"
@@ -30,9 +31,9 @@ struct ReadFailure {
   std::string detail;
 };
 
-/// What reading came to: a request, or else why there is none.
+/// What reading came to: a request, or else why there is none. Small, since each connection waits with room for one.
 struct ReadRequest {
-  std::optional<HttpRequest> request;
+  std::unique_ptr<HttpRequest> request;
   ReadFailure failure = {};
 };
 
@@ -63,6 +64,8 @@ class RequestReader {
   bool has_folded_header() const;
   /// Gives the parser what was read. Returns how much of it was taken.
   static std::size_t parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error);
+  /// The request whose header the parser has.
+  ReadRequest take();
   rr::awaitable<std::optional<ReadFailure>> read_on(std::size_t chunk);
 
   /// Reads have to end within that, until limit_ is disarmed.

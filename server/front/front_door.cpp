@@ -60,8 +60,8 @@ rr::awaitable<bool> take_proxy_header(GatewayState& gateway, rr::ByteStream& str
   }
 }
 
-/// Few: who comes and stays silent makes the gateway hold no more than this.
-constexpr std::size_t first_look = 256;
+/// Enough to tell the protocol and to say in the log what was found; each connection that stays silent holds so much.
+constexpr std::size_t first_look = 16;
 
 /// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
 rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStream& stream, const std::string& client) {
@@ -82,7 +82,7 @@ rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStrea
   }
   if (protocol == Protocol::unknown)
     gateway.log_refusal(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP", client,
-                        {{"peer", client}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
+                        {{"peer", client}, {"found", rr::as_text({first.data(), size})}});
   stream.put_back({first.data(), size});
   co_return protocol;
 }
@@ -91,8 +91,8 @@ rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStrea
 /// takes 50 kB for a handshake: only who has said something gets that, and a turn. Returns false where it does not
 /// come.
 rr::awaitable<bool> wait_for_hello(GatewayState& gateway, rr::ByteStream& stream) {
-  constexpr std::size_t header_size = 5;  // kind, version, length of what follows
-  constexpr std::size_t chunk = 1024;
+  constexpr std::size_t header_size = 5;                 // kind, version, length of what follows
+  constexpr std::size_t chunk = 1024;                    // at most: nobody is believed how much comes
   constexpr std::size_t most = header_size + 16 * 1024;  // OpenSSL refuses a longer one
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(gateway.config().limits.header_timeout);
@@ -100,7 +100,9 @@ rr::awaitable<bool> wait_for_hello(GatewayState& gateway, rr::ByteStream& stream
   std::size_t wanted = header_size;
   while (record.size() < wanted) {
     const auto size = record.size();
-    record.resize(size + chunk);
+    const auto next = size + std::min(chunk, wanted - size);
+    record.reserve(next);  // no more than that
+    record.resize(next);
     const auto read = co_await stream.read_some(std::span(record).subspan(size));
     if (read.error || read.is_end()) co_return false;
     record.resize(size + read.bytes);

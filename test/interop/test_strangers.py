@@ -1,5 +1,6 @@
 """Strangers who make the gateway hold what they send and do not read, while others go on: memory is counted, and bounded."""
 import concurrent.futures
+import contextlib
 import json
 import socket
 import ssl
@@ -207,6 +208,36 @@ def test_a_crowd_of_strangers_costs_little_memory(tmp_path):
             held = resident_bytes(pid)
             inside.ask()
     assert held - before < CROWD * MOST_EACH + MOST_BESIDE
+
+
+SAID = {  # bytes of memory that each may take, who says that much and nothing more
+    b"": 3500,
+    b"GET /api/v1/devices HTTP/1.1\r\nHost: localhost\r\nX-": 5500,
+    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"a" * 400: 5000,  # most of a hello of TLS
+}
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_who_says_little_costs_little_memory(tmp_path, said):
+    with crowds.site(tmp_path, {**crowds.room(2 * CROWD, 1), "header_timeout_ms": 60_000}) as gateway:
+        pid = gateway.process.process.pid
+
+        def come():
+            begin = resident_bytes(pid)
+            strangers = [Stranger(gateway) for _ in range(CROWD)]
+            for stranger in strangers:
+                stranger.link.sendall(said)
+            assert ask(gateway.port, "GET", "/healthz").status == 200  # behind them
+            return resident_bytes(pid) - begin, strangers
+
+        with contextlib.ExitStack() as all_stay:
+            taken = []
+            for _ in range(2):  # what is free already goes to the first
+                more, strangers = come()
+                taken.append(more)
+                for stranger in strangers:
+                    all_stay.callback(stranger.close)
+        assert taken[-1] < CROWD * SAID[said]
 
 
 def test_silent_handshakes_of_one_address_keep_out_no_other(tmp_path):
