@@ -1,10 +1,11 @@
 // The 3-D panel, at the drivers' base class for robots: its picture, and its numbers against those of the driver.
 import type { Page } from "@playwright/test";
-import { addPanel } from "../board";
+import { addPanel, arrange } from "../board";
 import launch from "../chromium.json" with { type: "json" };
 import { expect, test } from "../lab_test";
 import { startPeer } from "../peers";
 import type { Peer } from "../peers";
+import { startTestService, webRoot } from "../processes";
 
 test.use({
   launchOptions: {
@@ -61,6 +62,107 @@ test("a laser scanner of the standard types: its scan as points, without those t
     await expect(async () => expect((await canvas.screenshot()).equals(before)).toBe(false)).toPass();
   } finally {
     await scanner.stop();
+  }
+});
+
+const arm = (inside = "") => `<?xml version="1.0"?>
+<robot name="planar" xmlns:h="http://www.w3.org/1999/xhtml">${inside}
+  <link name="base"><visual><geometry><cylinder radius="0.06" length="0.1"/></geometry></visual></link>
+  <link name="upper"><visual><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.06 0.06"/></geometry></visual></link>
+  <link name="lower"><visual><geometry><mesh filename="package://planar/lower.stl"/></geometry></visual></link>
+  <link name="hand"><visual><geometry><sphere radius="0.05"/></geometry></visual></link>
+  <joint name="joint_0" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1"/><axis xyz="0 0 1"/></joint>
+  <joint name="joint_1" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.5 0 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="grip" type="fixed"><parent link="lower"/><child link="hand"/><origin xyz="0.4 0 0"/></joint>
+</robot>`;
+const file = (text: string, name = "planar.urdf") => ({ name, mimeType: "", buffer: Buffer.from(text) });
+
+test("a robot is shown by a model in URDF from a file, whose joints move with its own; the board keeps it", async ({
+  page,
+}) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await expect(panel(page).getByText("2 frames")).toBeVisible();
+  const canvas = panel(page).locator("canvas");
+  await canvas.scrollIntoViewIfNeeded();
+  const chain = await canvas.screenshot();
+  await arrange(page);
+  await panel(page).getByLabel("URDF file").setInputFiles(file(arm()));
+  await expect(panel(page)).toContainText("Meshes of the model, which are not shown: 1");
+  await arrange(page);
+  await panel(page).getByText("6 frames").click();
+  const isWhereTheDriverSays = async () => {
+    const [ours, theirs] = [await numbersOf(page, "hand"), await numbersOf(page, "kin_chain_tcp[0]")];
+    ours.forEach((each, i) => expect(Math.abs(each - (theirs[i] ?? NaN))).toBeLessThan(0.002));
+    return ours;
+  };
+  await expect(async () => void (await isWhereTheDriverSays())).toPass();
+  await page.getByRole("button", { name: "Jog", exact: true }).click();
+  const back = page.getByRole("button", { name: "joint_1 back" });
+  await expect(back).toBeEnabled();
+  const before = (await numbersOf(page, "hand"))[1] ?? NaN;
+  await back.focus();
+  await page.keyboard.down("Space");
+  await expect(async () => expect((await numbersOf(page, "hand"))[1]).toBeLessThan(before - 0.05)).toPass();
+  await page.keyboard.up("Space");
+  await expect(async () => void (await isWhereTheDriverSays())).toPass();
+
+  await page.reload();
+  await expect(panel(page).getByText("6 frames")).toBeVisible();
+  await canvas.scrollIntoViewIfNeeded();
+  expect((await canvas.screenshot()).equals(chain)).toBe(false);
+  await arrange(page);
+  await panel(page).getByLabel("Model").selectOption("No model");
+  await expect(panel(page).getByText("2 frames")).toBeVisible();
+});
+
+/** Chromium words an error of XML in a document with styles, and tells of each that the page's policy refuses it. */
+const told = test.extend<{ quiet: void }>({ quiet: async ({}, use) => use() });
+
+told("files that are no URDF are refused with the reason; a script in one is not run", async ({ page }) => {
+  const dialogs: string[] = [];
+  page.on("dialog", (dialog) => void (dialogs.push(dialog.message()), dialog.dismiss()));
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await arrange(page);
+  const input = panel(page).getByLabel("URDF file");
+  const alert = panel(page).locator(".model-tools").getByRole("alert");
+  const circle =
+    '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>';
+  for (const [text, reason] of [
+    ["<robot", "No URDF can be shown of planar.urdf: the model is no XML: "],
+    ['<!DOCTYPE robot [<!ENTITY a "b">]><robot>&a;</robot>', "expected URDF without one"],
+    [circle, "the model has 0 links that no joint carries, expected one, the base"],
+    ["<robot>" + "<link>".repeat(10_000), "No URDF can be shown of planar.urdf: the model is no XML: "],
+    ["x".repeat(100_001), "planar.urdf has 100001 bytes, expected at most 100000"],
+  ] as const) {
+    await input.setInputFiles(file(text));
+    await expect(alert).toContainText(reason);
+  }
+  await input.setInputFiles(
+    file(arm("<h:script>document.title = 'run'</h:script><h:img src='x' onerror='alert(1)'/>")),
+  );
+  await expect(alert).toBeHidden();
+  await expect(panel(page).getByText("6 frames")).toBeVisible();
+  await expect(page).not.toHaveTitle("run");
+  expect(dialogs).toEqual([]);
+});
+
+test("a property that holds URDF is shown as the model", async ({ page }) => {
+  const service = await startTestService(webRoot);
+  try {
+    const headers = { "Content-Type": "application/json" };
+    const written = await fetch(`${service.url}api/v1/devices/big/interop/p_string`, {
+      method: "PUT",
+      headers,
+      body: JSON.stringify(arm()),
+    });
+    expect(written.status).toBe(204);
+    await page.goto(`${service.url}#/devices/big/interop?view=board`);
+    await addPanel(page, "scene");
+    await panel(page).getByLabel("Model").selectOption("p_string");
+    await panel(page).getByText("4 frames").click();
+    await expect(frame(page, "hand")).toHaveText("hand: 0.900 0.000 0.100 m");
+  } finally {
+    await service.stop();
   }
 });
 

@@ -45,7 +45,7 @@ export interface Board {
 }
 
 export const MOST_PANELS = 64;
-const MOST_TEXT = 256 * 1024;
+const MOST_TEXT = 1024 * 1024; // with some models of robots
 
 /** @throws Error with what is wrong, where, and what was expected. */
 export function readBoard(json: unknown): Board {

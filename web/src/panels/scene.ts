@@ -1,8 +1,9 @@
-// The picture of a 3-D panel: chains of links, frames with their axes, a floor of squares. Drawn only when
+// The picture of a 3-D panel: chains of links, the shapes of a model, frames with their axes, a floor of squares. Drawn only when
 // something has changed. Layer: web/panels. The one file that imports three.js, which is loaded with the panel.
 
 import {
   AxesHelper,
+  BoxGeometry,
   BufferAttribute,
   BufferGeometry,
   Color,
@@ -27,6 +28,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Palette } from "../chart/palette";
 import type { Frame, Pose } from "../values/frames";
 import type { Points } from "../values/points";
+import type { Body, Shape } from "../values/urdf";
 
 export type View = "corner" | "above" | "front" | "side";
 
@@ -40,6 +42,7 @@ const SMALLEST_M = 0.3;
 const POINT_PX = 2;
 const FLOOR_SQUARES = 20;
 const UP = new Vector3(0, 1, 0); // along which cylinders lie
+const UP_TO_Z = new Quaternion().setFromUnitVectors(UP, new Vector3(0, 0, 1));
 
 export class Picture {
   readonly #renderer: WebGLRenderer;
@@ -47,6 +50,7 @@ export class Picture {
   readonly #camera = new PerspectiveCamera(40, 1, 0.001, 1000);
   readonly #controls: OrbitControls;
   readonly #chains = new Group();
+  readonly #bodies = new Group();
   readonly #frames = new Group();
   readonly #linkMaterial = new MeshLambertMaterial();
   readonly #jointMaterial = new MeshLambertMaterial();
@@ -56,6 +60,7 @@ export class Picture {
   );
   readonly #round = new SphereGeometry(1, 20, 12);
   readonly #tube = new CylinderGeometry(1, 1, 1, 20);
+  readonly #block = new BoxGeometry(1, 1, 1);
   readonly #resized: ResizeObserver;
   #floor: GridHelper | null = null;
   #line = "gray";
@@ -71,7 +76,8 @@ export class Picture {
     this.#renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     const sun = new DirectionalLight(0xffffff, 1.6);
     sun.position.set(1, -2, 4);
-    this.#scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.8), sun, this.#chains, this.#frames, this.#cloud);
+    const lights = [new HemisphereLight(0xffffff, 0x8899aa, 1.8), sun];
+    this.#scene.add(...lights, this.#chains, this.#bodies, this.#frames, this.#cloud);
     this.#camera.up.set(0, 0, 1); // as robots have it
     this.#controls = new OrbitControls(this.#camera, canvas);
     // One finger scrolls the page, as over a map: a panel may fill the screen of a phone.
@@ -98,14 +104,16 @@ export class Picture {
   }
 
   /** `chains`: the poses of each from its base to its flange. The first ones that come are looked at whole. */
-  show(chains: readonly (readonly Pose[])[], frames: readonly Frame[]): void {
-    const shown = JSON.stringify([chains, frames]);
+  show(chains: readonly (readonly Pose[])[], frames: readonly Frame[], bodies: readonly Body[]): void {
+    const shown = JSON.stringify([chains, frames, bodies]);
     if (shown === this.#shown) return; // a robot that stands still costs nothing
     this.#shown = shown;
-    const poses = [...chains.flat(), ...frames.map(({ pose }) => pose)];
+    const poses = [...chains.flat(), ...[...frames, ...bodies].map(({ pose }) => pose)];
     this.#makeRoom(Math.max(0, ...poses.map(({ at }) => Math.hypot(...at))));
     this.#chains.clear();
     for (const chain of chains) this.#addChain(chain);
+    this.#bodies.clear();
+    this.#bodies.add(...bodies.map((body) => this.#makeBody(body)));
     this.#showFrames([...chains.flatMap((chain) => chain.at(-1) ?? []), ...frames.map(({ pose }) => pose)]);
     if (poses.length > 0) this.#lookAtFirst();
     this.#redraw();
@@ -146,7 +154,15 @@ export class Picture {
     this.#floor?.dispose();
     for (const axes of this.#frames.children) (axes as AxesHelper).dispose();
     const { geometry, material } = this.#cloud;
-    for (const each of [this.#round, this.#tube, this.#linkMaterial, this.#jointMaterial, geometry, material])
+    for (const each of [
+      this.#round,
+      this.#tube,
+      this.#block,
+      this.#linkMaterial,
+      this.#jointMaterial,
+      geometry,
+      material,
+    ])
       each.dispose();
     this.#renderer.dispose();
   }
@@ -184,6 +200,24 @@ export class Picture {
       link.quaternion.setFromUnitVectors(UP, along.divideScalar(length));
       this.#chains.add(link);
     });
+  }
+
+  #makeBody({ shape, pose: { at, turn } }: Body): Mesh {
+    const [w, x, y, z] = turn;
+    const body = new Mesh(this.#geometryOf(shape), this.#linkMaterial);
+    body.position.set(...at);
+    body.quaternion.set(x, y, z, w);
+    if (shape.kind === "box") body.scale.set(...shape.size);
+    else if (shape.kind === "sphere") body.scale.setScalar(shape.radius);
+    else {
+      body.scale.set(shape.radius, shape.length, shape.radius);
+      body.quaternion.multiply(UP_TO_Z);
+    }
+    return body;
+  }
+
+  #geometryOf({ kind }: Shape): BufferGeometry {
+    return { box: this.#block, cylinder: this.#tube, sphere: this.#round }[kind];
   }
 
   #showFrames(poses: readonly Pose[]): void {

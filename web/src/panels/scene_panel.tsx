@@ -1,5 +1,5 @@
-// Poses, frames, point clouds and scans of a value in space, and the joints of a standard robot as a chain; frames as
-// numbers, too.
+// Poses, frames, point clouds and scans of a value in space, and the joints of a standard robot as a chain, or as its model in
+// URDF; frames as numbers, too.
 // Layer: web/panels.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
@@ -12,12 +12,13 @@ import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
 import { chainsOf, framesIn, posesOf } from "../values/frames";
 import { pointsIn } from "../values/points";
-import { readState } from "./joints";
+import { jointsOf, readState } from "./joints";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
 import { useRobotInfo } from "./robot_info";
 import { Picture } from "./scene";
+import { anglesOf, ModelNotes, ModelTools, placed, useModel } from "./scene_model";
 import "./scene_panel.css";
 
 const NO_POINTS = new Float32Array();
@@ -29,6 +30,8 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
   const look = useFeed(object, feedKindOf(choices.find((each) => each.name === name)), name);
   const { info, failure: unknown } = useRobotInfo(object, object?.has("robot_info", "property") === true);
   const chains = useMemo(() => chainsOf(info), [info]);
+  const joints = useMemo(() => jointsOf(info), [info]);
+  const { model, failure: noModel } = useModel(object, members, settings);
   const [failure, setFailure] = useState<string | null>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const picture = useRef<Picture | null>(null);
@@ -61,16 +64,18 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
       points,
     };
   }, [look.value, chains]);
-  useEffect(
-    () =>
-      picture.current?.show(
-        carried.map(({ poses }) => poses),
-        frames,
-      ),
-    [carried, frames],
+  const { bodies, bones, links } = useMemo(
+    () => placed(model, anglesOf(joints, readState(look.value)?.positions)),
+    [look.value, joints, model],
   );
+  const tips = carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose })));
+  useEffect(() => {
+    const chains = carried.map(({ poses }) => poses);
+    if (model) picture.current?.show(bones, [...tips, ...frames], bodies);
+    else picture.current?.show(chains, frames, []);
+  }, [carried, frames, bodies]);
   useEffect(() => picture.current?.showPoints(points ?? NO_POINTS), [points]);
-  const told = [...carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose }))), ...frames];
+  const told = [...tips, ...frames, ...links];
 
   return (
     <div class="scene-panel">
@@ -88,8 +93,9 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
         <button class="button button-quiet" type="button" onClick={() => picture.current?.look("side")}>
           {t("From the side")}
         </button>
+        <ModelTools members={members} settings={settings} change={change} />
       </div>
-      <Failure text={failure ?? unknown} />
+      <Failure text={failure ?? unknown ?? noModel} />
       <canvas
         ref={canvas}
         class={`scene ${look.stale === null ? "" : "is-stale"}`}
@@ -97,6 +103,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
         aria-label={t("{0} in space", name)}
       />
       <p class="note two-fingers">{t("Two fingers turn and zoom.")}</p>
+      <ModelNotes model={model} joints={joints} />
       {points && <p class="note">{t("{0} points", formatNumber(points.length / 3))}</p>}
       <details class="frames">
         <summary>{told.length === 1 ? t("1 frame") : t("{0} frames", told.length)}</summary>

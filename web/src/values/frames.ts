@@ -177,7 +177,7 @@ function multiply([a, b, c, d]: Turn, [e, f, g, h]: Turn): Turn {
   ];
 }
 
-function about([x, y, z]: Vector, angle: number): Turn {
+export function about([x, y, z]: Vector, angle: number): Turn {
   const length = Math.hypot(x, y, z) || 1;
   const part = Math.sin(angle / 2) / length;
   return [Math.cos(angle / 2), x * part, y * part, z * part];
