@@ -44,7 +44,7 @@ const phone = {
 const button = document.querySelector("button");
 button.onclick = async () => {
   button.disabled = true;
-  await DeviceMotionEvent.requestPermission?.(); // of iOS, which asks where a button was pressed
+  await globalThis.DeviceMotionEvent?.requestPermission?.(); // of iOS, which asks where a button was pressed
   const name = new URLSearchParams(location.search).get("name") ?? "phone";
   const show = (isServed, reason) => (output.textContent = isServed ? `device "${name}"` : `no device: ${reason}`);
   try {

@@ -5,8 +5,10 @@ import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
 import launch from "../chromium.json" with { type: "json" };
+import { inEachEngine } from "../engines";
 import { password } from "../guarded_lab";
 import { Program, freePort, repositoryRoot, rrgate } from "../processes";
+import { button } from "../visitor";
 
 const camera = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
 test.use({ launchOptions: { ...launch, args: [...launch.args, ...camera] } });
@@ -37,30 +39,12 @@ test.afterAll(async () => {
 const member = (name: string) => `${url}api/v1/devices/phone/Phone/${name}`;
 const devices = async () => ((await (await fetch(`${url}api/v1/devices`)).json()) as { devices: unknown[] }).devices;
 
-test("a page is a device with camera, motion and touch, and no more when it is closed", async ({ page }) => {
+test("the camera of a page that is a device is a pipe of pictures, which any <img> shows", async ({ page }) => {
   const complaints: string[] = [];
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.goto(url);
   await page.getByRole("button").click();
   await expect(page.locator("output")).toHaveText('device "phone"');
-  await expect.poll(devices).toMatchObject([{ name: "phone", state: "online", served: true }]);
-
-  const written = await fetch(member("text"), {
-    method: "PUT",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify("hello"),
-  });
-  expect(written.status).toBe(204);
-  await expect(page.locator("q")).toHaveText("hello");
-
-  // What it feels.
-  await page.evaluate(() => {
-    const accelerationIncludingGravity = { x: 1, y: 2, z: 9.5 };
-    dispatchEvent(new DeviceMotionEvent("devicemotion", { accelerationIncludingGravity }));
-  });
-  await expect.poll(async () => (await fetch(member("acceleration"))).json()).toEqual([1, 2, 9.5]);
-
-  // What it sees: a picture that any <img> shows.
   const stop = new AbortController();
   const pictures = await fetch(`${member("frames")}?as=mjpeg`, { signal: stop.signal });
   expect(pictures.headers.get("content-type")).toContain("multipart/x-mixed-replace");
@@ -69,19 +53,47 @@ test("a page is a device with camera, motion and touch, and no more when it is c
   while (!head.includes("\r\n\r\n")) head += Buffer.from((await reader.read()).value!).toString("latin1");
   expect(head).toContain("Content-Type: image/jpeg");
   stop.abort();
-
-  // What touches it.
-  const touches = await fetch(member("touched"), { headers: { Accept: "text/event-stream" } });
-  const heard = touches.body!.pipeThrough(new TextDecoderStream()).getReader();
-  await page.mouse.click(64, 80);
-  let text = "";
-  while (!text.includes('"x"')) text += (await heard.read()).value ?? "";
-  expect(text).toContain('"x":0.05');
-  await heard.cancel();
-
   await page.close();
   await expect.poll(devices).toEqual([]);
   expect(complaints).toEqual([]);
+});
+
+inEachEngine((at) => {
+  test("a page is a device with motion and touch, and no more when it is left", async () => {
+    const visitor = at();
+    await visitor.open(url);
+    await visitor.press(button("Be a device"));
+    await visitor.see({ css: "output" }, /^device "phone"$/);
+    await expect.poll(devices).toMatchObject([{ name: "phone", state: "online", served: true }]);
+
+    const written = await fetch(member("text"), {
+      method: "PUT",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify("für alle"),
+    });
+    expect(written.status).toBe(204);
+    await visitor.see({ css: "q" }, /^für alle$/);
+
+    // What it feels. Not every engine has a DeviceMotionEvent.
+    await visitor.run(() => {
+      const accelerationIncludingGravity = { x: 1, y: 2, z: 9.5 };
+      dispatchEvent(Object.assign(new Event("devicemotion"), { accelerationIncludingGravity }));
+    });
+    await expect.poll(async () => (await fetch(member("acceleration"))).json()).toEqual([1, 2, 9.5]);
+
+    // What touches it.
+    const touches = await fetch(member("touched"), { headers: { Accept: "text/event-stream" } });
+    const heard = touches.body!.pipeThrough(new TextDecoderStream()).getReader();
+    await visitor.press({ css: "video" });
+    let text = "";
+    while (!/"y":[\d.]+/.test(text)) text += (await heard.read()).value ?? "";
+    expect(text).toMatch(/"x":0\.\d+/);
+    await heard.cancel();
+
+    expect(await visitor.complaints()).toEqual([]);
+    await visitor.open("about:blank");
+    await expect.poll(devices).toEqual([]);
+  });
 });
 
 test("a page whose camera is denied is a device without pictures", async ({ page }) => {
