@@ -1,11 +1,12 @@
-// What a form gives as code, run as it is copied: by a shell, and by Python with Robot Raconteur.
+// What a form gives as code, run as it is copied: by Node with rrgate-client, by a shell, and by Python with Robot Raconteur.
 import { execFile } from "node:child_process";
+import path from "node:path";
 import { promisify } from "node:util";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import { addPanel } from "../board";
 import { python } from "../peers";
-import { startTestService, webRoot } from "../processes";
+import { repositoryRoot, startTestService, webRoot } from "../processes";
 
 let service: Awaited<ReturnType<typeof startTestService>>;
 
@@ -16,6 +17,7 @@ test.beforeAll(async () => {
 test.afterAll(() => service?.stop());
 
 const run = promisify(execFile);
+const hasTheClient = { cwd: path.join(repositoryRoot, "web"), env: { ...process.env, ["FORCE_COLOR"]: "0" } };
 
 interface Way {
   language: string;
@@ -24,6 +26,13 @@ interface Way {
 }
 
 const ways: readonly Way[] = [
+  {
+    language: "JavaScript",
+    // A page ends with its connection, a program by closing it.
+    execute: (code) =>
+      run(process.execPath, ["--input-type=module", "-e", `${code}\nawait robot.$.close();`], hasTheClient),
+    resultOf: Number,
+  },
   {
     language: "curl",
     execute: (code) => run("sh", ["-c", code.replace(/^curl /, "curl --fail --silent --show-error ")]),
