@@ -1,4 +1,5 @@
-"""Small peers, as the twelve sensors of the paper's conference room: each takes one connection at a time, and many clients use it."""
+"""Small peers, as the twelve sensors of the paper's conference room: each takes one connection at a time, some write over-long sizes, and
+many clients use them."""
 import json
 import sys
 

@@ -2,7 +2,8 @@
 
 small_sensors.py        prints their ports as a JSON array; runs until its standard input ends
 
-Each is a node of the real package behind a port that takes the next connection when the last one has gone.
+Each is a node of the real package behind a port that takes the next connection when the last one has gone. Every second one
+writes sizes at full length.
 """
 import json
 import select
@@ -13,6 +14,7 @@ import threading
 import RobotRaconteur as RR
 
 import quiet_node
+from long_sizes import Lengthened
 
 COUNT = 12
 DEFINITION = """service experimental.small_sensor
@@ -32,8 +34,9 @@ class Sensor:
 class OnlyOne:
     """A port in front of another one, with one connection at a time: further ones wait until it has gone."""
 
-    def __init__(self, port):
+    def __init__(self, port, has_long_sizes):
         self._port = port
+        self._has_long_sizes = has_long_sizes
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
         threading.Thread(target=self._run, daemon=True).start()
@@ -46,12 +49,13 @@ class OnlyOne:
         try:
             with client, socket.create_connection(("127.0.0.1", self._port)) as device:
                 other = {client: device, device: client}
+                lengthened = Lengthened()
                 while True:
                     for end in select.select(list(other), [], [])[0]:
                         data = end.recv(65536)
                         if not data:
                             return
-                        other[end].sendall(data)
+                        other[end].sendall(lengthened(data) if end is device and self._has_long_sizes else data)
         except OSError:
             pass  # one of them is gone
 
@@ -67,7 +71,7 @@ def main():
         node.RegisterServiceType(DEFINITION)
         node.RegisterService("Sensor", "experimental.small_sensor.Sensor", sensor)
         running.append((setup, node, sensor))
-        ports.append(OnlyOne(setup.tcp_transport.GetListenPort()).port)
+        ports.append(OnlyOne(setup.tcp_transport.GetListenPort(), number % 2 == 1).port)
     stopped = threading.Event()
 
     def publish():
