@@ -1,19 +1,25 @@
 """Strangers who make the gateway hold what they send and do not read, while others go on: memory is counted, and bounded."""
+import base64
 import concurrent.futures
 import contextlib
 import json
+import os
+import select
 import socket
 import ssl
+import sys
 import time
 
 import crowds
 import pytest
 import RobotRaconteur as RR
 
+from directions import PEERS
 from gateways import running
 from http_api import BASE, Stream, ask
 from json_sockets import Socket
 from load import resident_bytes
+from processes import Background
 from shared_sites import is_refused, start_service
 
 MEMORY = 64_000_000
@@ -135,6 +141,43 @@ def test_answers_that_nobody_reads_are_counted_and_bounded(gateway):
     assert add(gateway, 3, 4) == 7
     for stranger in strangers:
         stranger.close()
+
+
+def test_viewers_that_read_no_frames_are_counted_and_bounded(tmp_path):
+    """Each waits with another frame: of three megabytes, and as JPEG of more than one."""
+    device = Background([sys.executable, PEERS / "images.py"], tmp_path / "device.log")
+    config = {"devices": [{"name": "camera", "url": json.loads(device.next_line())["url"]}], "limits": {"memory": MEMORY}}
+    path, side = "/api/v1/devices/camera/camera", 1000
+    frame = {"width": side, "height": side, "format": "bgr8", "data": base64.b64encode(os.urandom(3 * side * side)).decode()}
+    with running(tmp_path, config) as gateway:
+        gateway.wait_for("device online", device="camera")
+
+        def show():
+            assert ask(gateway.port, "POST", path + "/show", {"frame": frame}, address="127.0.0.3").status == 200
+
+        show()
+        before, viewers = gateway.metrics(), []
+        for _ in range(40):
+            viewer = Stranger(gateway)
+            viewers.append(viewer)
+            viewer.link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            viewer.link.sendall(f"GET {path}/frames?as=mjpeg HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            while not viewer.link.recv(4096).endswith(b"--frame\r\n\r\n"):
+                pass
+            refusals = gateway.metrics()["rrgate_memory_budget_refusals_total"]
+            show()
+            deadline = time.monotonic() + 20
+            while not select.select([viewer.link], [], [], 0.05)[0]:  # a frame comes
+                if gateway.metrics()["rrgate_memory_budget_refusals_total"] > refusals:
+                    break
+                assert time.monotonic() < deadline
+        now = gateway.metrics()
+        assert MEMORY // 4 < now["rrgate_memory_budget_used_bytes"] <= MEMORY // 2 + 2_000_000  # and the newest frame
+        assert now["process_resident_memory_bytes"] - before["process_resident_memory_bytes"] < MEMORY // 2 + SLACK
+        assert ask(gateway.port, "GET", path + "/still", address="127.0.0.3").status == 200
+        for viewer in viewers:
+            viewer.close()
+    device.stop()
 
 
 def test_at_its_end_what_is_new_is_refused_and_what_runs_goes_on(gateway, node):

@@ -16,16 +16,20 @@ namespace {
 
 rr::awaitable<void> encode(std::shared_ptr<SampleJpeg> jpeg, ImageWork work, Workers& workers) {
   const auto encoding = [&work] { return encode_image(work); };
-  jpeg->result = co_await workers.run(encoding);
-  if (*jpeg->result) jpeg->memory.hold((*jpeg->result)->size());
+  auto made = co_await workers.run(encoding);
+  if (made) {
+    jpeg->memory.hold(made->size());
+    jpeg->result = std::make_shared<const std::string>(std::move(*made));
+  } else {
+    jpeg->result = made.error();
+  }
   jpeg->done.cancel();
 }
 
 }  // namespace
 
-rr::awaitable<std::shared_ptr<const SampleJpeg>> jpeg_of(SamplePtr sample, const rr::TypeDefinition& type,
-                                                         const rr::TypeRegistry& types, MemoryBudget& memory,
-                                                         Workers& workers) {
+rr::awaitable<JpegImage> jpeg_of(SamplePtr sample, const rr::TypeDefinition& type, const rr::TypeRegistry& types,
+                                 MemoryBudget& memory, Workers& workers) {
   auto jpeg = sample->jpeg;
   if (!jpeg) {
     const auto executor = co_await asio::this_coro::executor;
@@ -37,7 +41,7 @@ rr::awaitable<std::shared_ptr<const SampleJpeg>> jpeg_of(SamplePtr sample, const
       jpeg->result = work.error();
   }
   while (!jpeg->result) co_await jpeg->done.async_wait(asio::as_tuple(asio::use_awaitable));
-  co_return jpeg;
+  co_return *jpeg->result;
 }
 
 }  // namespace rrgate

@@ -143,13 +143,17 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
       co_await newest->news.async_wait(asio::as_tuple(asio::use_awaitable));
       continue;
     }
-    const auto sample = std::exchange(newest->sample, nullptr);
-    const auto jpeg = co_await jpeg_of(sample, member.type, target.types(), gateway.memory(), gateway.workers());
-    if (!*jpeg->result) {
-      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg->result->error().message}});
+    auto sample = std::exchange(newest->sample, nullptr);
+    const auto jpeg =
+        co_await jpeg_of(std::move(sample), member.type, target.types(), gateway.memory(), gateway.workers());
+    if (!jpeg) {
+      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg.error().message}});
       continue;
     }
-    const std::string& image = **jpeg->result;
+    const std::string& image = **jpeg;
+    // The client may take its time: by then the frame, with what is counted for it, has gone.
+    auto room = writer.memory().sibling();
+    if (!room.resize(image.size())) continue;
     const auto head = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(image.size()) + "\r\n\r\n";
     const std::array<std::string_view, 3> part{head, image, "\r\n--frame\r\n"};
     failed = co_await writer.write(part);
