@@ -24,6 +24,7 @@ struct Robot {
                                         "function void fail(uint16 code)\nfunction int32{generator} hang()\n"
                                         "function string spell()\nfunction string{generator} spells()\n"
                                         "function int32[]{generator} rows()\n"
+                                        "function int32[]{generator} long_rows(uint32 count)\n"
                                         "event news(string text)\nend\n"},
                                        "Robot", "Robot")),
         node([this, &policy](rr::Node& made) {
@@ -55,6 +56,11 @@ struct Robot {
             return [left = 2]() mutable -> std::optional<std::vector<std::int32_t>> {
               if (left-- == 0) return std::nullopt;
               return std::vector<std::int32_t>{1, left};
+            };
+          });
+          service->generator("long_rows", [](std::uint32_t count) {
+            return [count]() -> std::optional<std::vector<std::int32_t>> {
+              return std::vector<std::int32_t>(count, 1'000'000'000);
             };
           });
           made.add(service);
@@ -149,6 +155,30 @@ TEST_CASE("the lines of a generator are JSON for clients that take CBOR, too") {
   const auto answer = client.receive_until("\r\n0\r\n\r\n");
   CHECK_THAT(answer, Catch::Contains("application/x-ndjson"));
   CHECK_THAT(answer, Catch::Contains("\n[1,1]\n") && Catch::Contains("\n[1,0]\n"));
+}
+
+TEST_CASE(
+    "values of a generator that wait for a slow client are counted, and those for which there is no memory end it") {
+  constexpr std::size_t text_bytes = 11'000'000;  // of a million numbers: more than sockets hold
+  Robot robot;
+  TestGateway gateway(0, [&](Config& config) {
+    with(robot)(config);
+    config.limits.memory = 64'000'000;
+  });
+  TestClient reader(gateway.port()), asker(gateway.port());
+  call(reader, "long_rows", R"({"count":1000000})");
+  reader.receive_until("[1000000000,");
+  const auto used = [&] {
+    asker.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    const auto text = asker.receive_response().body;
+    constexpr std::string_view name = "\nrrgate_memory_budget_used_bytes ";
+    return std::stoul(text.substr(text.find(name) + name.size()));
+  };
+  CHECK(used() >= text_bytes);
+  CHECK(used() < 2 * text_bytes);  // nothing but the text waits
+  TestClient other(gateway.port());
+  call(other, "long_rows", R"({"count":3000000})");
+  CHECK_THAT(other.receive_until("\r\n0\r\n\r\n"), Catch::Contains("RobotRaconteur.OutOfSystemResource"));
 }
 
 TEST_CASE("what a device has done is not told as refused because JSON has no form for its answer") {

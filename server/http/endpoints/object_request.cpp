@@ -195,38 +195,44 @@ rr::Result<rr::Json> ObjectRequest::read_body() const {
 
 rr::awaitable<Response> ObjectRequest::value_response(const Target& target, const rr::Value& value,
                                                       std::string_view name) const {
+  auto json = co_await make_json(target, value, form_, name);
+  co_return co_await value_response(std::move(json));
+}
+
+rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
+  const bool is_cbor = wanted_ == BodyForm::cbor;
+  auto body = co_await write_document(std::move(json), is_cbor);
+  if (!body) co_return refuse_for_memory(&gateway_.metrics());
+  auto response = text_response(200, is_cbor ? "application/cbor" : "application/json", std::move(*body));
+  response.set("Cache-Control", "no-store");
+  co_return response;
+}
+
+rr::awaitable<rr::OrderedJson> ObjectRequest::make_json(const Target& target, const rr::Value& value,
+                                                        const rr::JsonForm& form, std::string_view name) const {
   const auto make = [&] {
-    auto json = to_json(target, value, form_);
+    auto json = to_json(target, value, form);
     if (name.empty()) return json;
     auto named = rr::OrderedJson::object();
     rr::add_key(named, name) = std::move(json);
     return named;
   };
-  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type))
-    co_return co_await value_response(make());
-  auto json = co_await gateway_.workers().run(make);
-  co_return co_await value_response(std::move(json));
+  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type)) co_return make();
+  co_return co_await gateway_.workers().run(make);
 }
 
-rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
+rr::awaitable<std::optional<std::string>> ObjectRequest::write_document(rr::OrderedJson json, bool is_cbor) const {
   const auto held = held_bytes(json);
   auto room = writer_.memory().sibling();
-  if (held > large_json_bytes && !room.resize(held)) co_return refuse_for_memory(&gateway_.metrics());
-  const bool is_cbor = wanted_ == BodyForm::cbor;
+  if (held > large_json_bytes && !room.resize(held)) co_return std::nullopt;
   // It is the worker that frees a large one, too: that takes as long as to write it.
   auto write = [json = std::move(json), is_cbor] {
     if (!is_cbor) return rr::write_json(json) + "\n";
     const auto bytes = rr::write_cbor(json);
     return std::string(bytes.begin(), bytes.end());
   };
-  std::string body;
-  if (held <= large_json_bytes)
-    body = write();
-  else
-    body = co_await gateway_.workers().run(std::move(write));
-  auto response = text_response(200, is_cbor ? "application/cbor" : "application/json", std::move(body));
-  response.set("Cache-Control", "no-store");
-  co_return response;
+  if (held <= large_json_bytes) co_return write();
+  co_return co_await gateway_.workers().run(std::move(write));
 }
 
 Response ObjectRequest::written_response() const {

@@ -109,6 +109,12 @@ class ObjectRequest {
   /// wait.
   rr::awaitable<Response> value_response(const Target& target, const rr::Value& value,
                                          std::string_view name = {}) const;
+  /// `value` as JSON of that form, or an object with that alone; made on a worker where it is large. All are borrowed
+  /// for the wait. Throws   those of to_json().
+  rr::awaitable<rr::OrderedJson> make_json(const Target& target, const rr::Value& value, const rr::JsonForm& form,
+                                           std::string_view name = {}) const;
+  /// JSON with a line's end, or CBOR; written on a worker where it is large. nullopt: there is no memory left for that.
+  rr::awaitable<std::optional<std::string>> write_document(rr::OrderedJson json, bool is_cbor) const;
   Response written_response() const;  ///< 204
   Response error_response(const rr::Error& error, const rr::TypeRegistry* types) const;
   /// 405 with what is possible.

@@ -43,6 +43,18 @@ rr::JsonForm text_form(const ObjectRequest& request) {
   return form;
 }
 
+/// A line of a generator, counted in `room`. Throws   rr::Exception: those of to_json(); out_of_system_resource.
+rr::awaitable<std::string> make_line(const ObjectRequest& request, const Target& target, const rr::Value& value,
+                                     MemoryBudget::Charge& room) {
+  const auto form = text_form(request);
+  auto json = co_await request.make_json(target, value, form);
+  auto line = co_await request.write_document(std::move(json), false);
+  // For so little there was room when the request came.
+  if (line && (line->size() <= least_room || room.resize(line->size()))) co_return std::move(*line);
+  request.gateway().reject(Rejection::memory);
+  refuse(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left for this value");
+}
+
 Response stream_head(std::string_view content_type) {
   Response head;
   head.set("Content-Type", std::string(content_type)).set("Cache-Control", "no-store");
@@ -191,23 +203,23 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     *gone = true;
     client->drop_generator(generator);  // the step that is at work may take its time
   });
-  const auto form = text_form(request);
   bool has_ended = false;
   while (!failed && !*gone && !has_ended) {
-    rr::OrderedJson line;
+    auto room = writer.memory().sibling();
+    std::string line;
     try {
       auto step = target.request(rr::CallKind::generator_next);
       step.generator = generator;
       const auto value = co_await target.client->ask(std::move(step));
-      line = to_json(target, value, form);
+      line = co_await make_line(request, target, value, room);
     } catch (const rr::Exception& exception) {
       has_ended = true;
       if (exception.error().code == rr::ErrorCode::stop_iteration) break;
-      line = rr::error_to_json(exception.error(), target.types());
+      line = rr::write_json(rr::error_to_json(exception.error(), target.types())) + "\n";
     }
-    const auto text = rr::write_json(line);
-    const auto framed = !as_events ? text + "\n" : (has_ended ? "event: error\n" : "") + ("data: " + text + "\n\n");
-    failed = co_await writer.write(framed);
+    const std::string_view begin = !as_events ? "" : has_ended ? "event: error\ndata: " : "data: ";
+    const std::array<std::string_view, 3> parts{begin, line, as_events ? "\n" : ""};
+    failed = co_await writer.write(parts);
   }
   target.client->drop_generator(generator);
   if (!failed && !*gone) co_await writer.end();
