@@ -60,6 +60,14 @@ std::string_view HttpRequest::header(std::string_view name) const {
   return found == message.end() ? std::string_view() : rr::trim(view(found->value()));
 }
 
+std::string HttpRequest::list(http::field name) const {
+  std::string out;
+  const auto lines = message.equal_range(name);
+  for (auto line = lines.first; line != lines.second; ++line)
+    out.append(out.empty() ? "" : ", ").append(rr::trim(view(line->value())));
+  return out;
+}
+
 Response text_response(unsigned status, std::string_view content_type, std::string body) {
   Response response;
   response.status = status;

@@ -37,6 +37,8 @@ struct HttpRequest {
   /// First value of a header, without surrounding white space; empty when absent.
   std::string_view header(http::field name) const;
   std::string_view header(std::string_view name) const;
+  /// All values of a header that is a list: several lines are one, with commas (RFC 9110, section 5.3).
+  std::string list(http::field name) const;
 };
 
 class ResponseWriter;

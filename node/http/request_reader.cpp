@@ -22,7 +22,8 @@ ReadFailure failure_of(const boost::beast::error_code& error, const RequestLimit
   return {400, "not an HTTP request: " + error.message()};
 }
 
-/// What Beast takes and others may read differently: where a request ends, and whom it is for, must be beyond doubt.
+/// What Beast takes and others may read differently: where a request ends, whom it is for, and what its body is, must
+/// be beyond doubt.
 std::optional<ReadFailure> check_header(const HttpRequest& request) {
   const auto& message = request.message;
   const auto codings = message.count(http::field::transfer_encoding);
@@ -31,6 +32,9 @@ std::optional<ReadFailure> check_header(const HttpRequest& request) {
     return ReadFailure{501, "Transfer-Encoding is " + rr::quote(coding) + ", expected \"chunked\" alone"};
   if (codings != 0 && (message.version() < 11 || message.count(http::field::content_length) != 0))
     return ReadFailure{400, "Transfer-Encoding needs HTTP/1.1, and no Content-Length beside it"};
+  const auto encoding = request.list(http::field::content_encoding);
+  if (!encoding.empty() && !equals_ignoring_case(encoding, "identity"))
+    return ReadFailure{415, "Content-Encoding is " + rr::quote(encoding) + "; send the body as it is"};
   const auto hosts = message.count(http::field::host);
   if (hosts > 1 || (hosts == 0 && message.version() >= 11))
     return ReadFailure{400, "the request has " + std::to_string(hosts) + " Host headers, expected one"};

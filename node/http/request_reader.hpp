@@ -27,7 +27,7 @@ inline constexpr std::size_t least_rate = 8 * 1024;
 
 /// Why something could not be read.
 struct ReadFailure {
-  unsigned status = 0;  ///< to refuse with: 400, 408, 413, 431, 501, 503; 0: the peer is gone
+  unsigned status = 0;  ///< to refuse with: 400, 408, 413, 415, 431, 501, 503; 0: the peer is gone
   std::string detail;
 };
 

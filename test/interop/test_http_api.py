@@ -3,6 +3,7 @@ import base64
 import functools
 import http.client
 import json
+import struct
 import sys
 import threading
 import time
@@ -175,6 +176,10 @@ def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gate
     ranged = ask(gateway, "PUT", "/m_numbers", [9, 9], {"Content-Range": "bytes 16-31/800"})
     assert ranged.status == 400 and "offset" in ranged.json["detail"]
     assert ask(gateway, "PUT", "/p_double", 9, {"Content-Range": "bytes 0-7/8"}).status == 400
+    numbers = {"Content-Type": "application/octet-stream"}
+    for encoding in ("gzip", "identity, br"):
+        packed = ask(gateway, "PUT", "/m_numbers", bytes(16), {**numbers, "Content-Encoding": encoding})
+        assert packed.status == 415 and encoding in packed.json["detail"]
     longer = ask(gateway, "PUT", "/m_numbers?offset=1&count=1", [9, 9, 9])
     assert (longer.status, longer.json["error"]["name"]) == (400, "RobotRaconteur.InvalidArgument")
     assert "3 items" in longer.json["detail"]
@@ -182,6 +187,8 @@ def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gate
     assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 2, 3, 4]
     assert ask(gateway, "PUT", "/m_numbers?offset=1&count=2", [20, 30], {"Range": "bytes=0-7"}).status == 204  # it is of GET alone
     assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 20, 30, 4]
+    assert ask(gateway, "PUT", "/m_numbers", struct.pack("<d", 5), {**numbers, "Content-Encoding": "identity"}).status == 204
+    assert ask(gateway, "GET", "/m_numbers?count=2").json == [5, 20]
 
 
 def test_what_is_too_large_for_a_message_is_not_sent_and_said_to_be_that(gateway):
