@@ -191,6 +191,18 @@ def test_a_slow_viewer_gets_the_newest(gateway):
     motion.close()
 
 
+def test_a_slow_viewer_gets_the_last_one_before_the_end(gateway):
+    motion = Motion(gateway, "/clip?as=mjpeg")
+    noise = os.urandom(1000 * 1000)
+    for _ in range(60):
+        ask(gateway, "POST", "/show", {"frame": frame(1000, 1000, "mono8", noise)}, base=BASE)
+    ask(gateway, "POST", "/show_last", {"frame": frame(16, 16, "mono8", bytes(256))}, base=BASE)
+    while motion.next().size != (16, 16):
+        pass
+    assert motion.response.read() == b""
+    motion.close()
+
+
 def test_what_takes_long_keeps_nobody_waiting(gateway):
     """Twelve million pixels, which take a second or so to pack."""
     put(gateway, 4000, 3000, "mono8", os.urandom(4000) * 3000)

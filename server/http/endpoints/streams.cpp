@@ -123,7 +123,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
     explicit Newest(const asio::any_io_executor& executor) : news(executor, asio::steady_timer::time_point::max()) {}
     SamplePtr sample;
     bool is_gone = false;
-    bool is_over = false;  ///< no more frames come
+    bool is_over = false;  ///< no more frames come than `sample`
     asio::steady_timer news;
   };
   auto& writer = request.writer();
@@ -131,10 +131,12 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   const auto& member = *target.member;
   const auto newest = std::make_shared<Newest>(writer.executor());
   SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error* error) {
-    // Of a device that is lost more frames come when it is back.
-    if (error && error->code == rr::ErrorCode::invalid_state) newest->is_over = true;
-    if (!sample && !newest->is_over) return;
-    newest->sample = sample;
+    if (sample)
+      newest->sample = sample;
+    else if (error && error->code == rr::ErrorCode::invalid_state)
+      newest->is_over = true;
+    else
+      return;  // of a device that is lost more frames come when it is back
     newest->news.cancel();
   };
   auto place = target.place();
@@ -150,7 +152,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   });
   // Browsers show a part when the next one's boundary has come: each is followed by it at once.
   auto failed = co_await writer.write("--frame\r\n");
-  while (!failed && !newest->is_gone && !newest->is_over) {
+  while (!failed && !newest->is_gone && (newest->sample || !newest->is_over)) {
     if (!newest->sample) {
       co_await newest->news.async_wait(asio::as_tuple(asio::use_awaitable));
       continue;

@@ -14,6 +14,18 @@ DEFINITION = pathlib.Path(__file__).parent.parent / "experimental.images.robdef"
 class Camera:
     photo = still = other = None
 
+    def __init__(self):
+        self.viewers = []
+
+    @property
+    def clip(self):
+        return self._clip
+
+    @clip.setter
+    def clip(self, pipe):
+        self._clip = pipe
+        pipe.PipeConnectCallback = self.viewers.append
+
     def capture(self, width, height):
         frame = RR.RobotRaconteurNode.s.NewStructure("experimental.images.Frame")
         frame.width, frame.height, frame.format = width, height, "mono8"
@@ -23,6 +35,15 @@ class Camera:
     def show(self, frame):
         self.live.OutValue = frame
         self.frames.AsyncSendPacket(frame, lambda *_: None)
+        for viewer in self.viewers:
+            viewer.SendPacket(frame)
+
+    def show_last(self, frame):
+        """The clip ends with it."""
+        while self.viewers:
+            viewer = self.viewers.pop()
+            viewer.SendPacket(frame)
+            viewer.Close()
 
 
 def main():
