@@ -159,7 +159,7 @@ def test_memories(gateway):
     within = ask(gateway, "GET", "/m_large", headers={"Accept": "application/octet-stream", "Range": "bytes=9-16"})
     assert within.status == 206 and len(within.body) == 8
     part = ask(gateway, "GET", "/m_fixed?offset=7&count=2", headers={"Accept": "application/octet-stream"})
-    assert (part.status, part.body) == (200, bytes([7, 8]))
+    assert (part.status, part.body, part.headers["Cache-Control"]) == (200, bytes([7, 8]), "no-store")
     rest = ask(gateway, "GET", "/m_fixed?offset=7", headers={"Accept": "application/octet-stream"})
     assert (rest.status, rest.body) == (200, bytes([7, 8, 9]))
     first = ask(gateway, "GET", "/m_large?count=1", headers={"Accept": "application/octet-stream"})

@@ -198,7 +198,9 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   const auto items = co_await read_items(target, shape, position, count);
   if (request.wanted() == BodyForm::bytes) {
     const auto bytes = rr::as_text(payload_of(items));
-    co_return text_response(200, "application/octet-stream", std::string(bytes));
+    auto response = text_response(200, "application/octet-stream", std::string(bytes));
+    response.set("Cache-Control", "no-store");
+    co_return response;
   }
   co_return co_await request.value_response(target, items);
 }
