@@ -134,6 +134,8 @@ rr::Result<> check_image(const PixelImage& image) {
   // Both factors have been bounded, the step by the data: nothing overflows.
   if (image.step > image.data.size() || image.step * (image.height - 1) + row > image.data.size())
     return not_encoded("has " + std::to_string(image.data.size()) + " bytes, too few for " + size + " pixels");
+  if (image.data.size() > image.step * image.height)  // other pixels than it says
+    return not_encoded("has " + std::to_string(image.data.size()) + " bytes, too many for " + size + " pixels");
   return {};
 }
 

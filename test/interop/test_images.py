@@ -114,7 +114,8 @@ def test_functions_and_wires(gateway):
 @pytest.mark.parametrize("width, height, encoding, size, detail", [
     (0xFFFFFFFF, 0xFFFFFFFF, "rgb8", 12, "pixels, expected 1 to 16384"), (65536, 65536, "mono8", 0, "pixels, expected"),
     (16384, 16384, "mono8", 4, "pixels, expected"), (0, 5, "mono8", 5, "0 x 5 pixels"), (4, 4, "rgb8", 47, "47 bytes, too few"),
-    (4, 4, "rgb8", 0, "0 bytes, too few"), (10, 10, "yuv422", 200, "is encoded as 'yuv422'"),
+    (4, 4, "rgb8", 0, "0 bytes, too few"), (2, 2, "rgb8", 16, "16 bytes, too many"), (2, 2, "mono8", 400, "400 bytes, too many"),
+    (20, 10, "", 300, "300 bytes, too many"), (10, 10, "yuv422", 200, "is encoded as 'yuv422'"),
     (4, 4, "", 35, "does not say how"), (0, 0, "", 0, "does not say how"), (2**31, 2**31, "", 3, "does not say how")])
 def test_sizes_that_lie(gateway, width, height, encoding, size, detail):
     put(gateway, width, height, encoding, bytes(size))

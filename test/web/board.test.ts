@@ -712,6 +712,8 @@ test("pictures of the standard types are read by their encoding", () => {
   expect(rgbaOf(readPicture(depth))).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
   const jpeg = Uint8Array.of(255, 216, 255);
   expect(readPicture({ image_info: info, data: jpeg }).encoded).toBe(jpeg); // not copied
+  const surplus = { image_info: { width: 2, height: 2, encoding: "rgb8" }, data: new Uint8Array(16) }; // with alpha
+  expect(() => readPicture(surplus)).toThrow("16 bytes");
   const grey = { image_info: { width: 2, height: 1, step: 2, encoding: "mono8" }, data: Uint8Array.of(7, 255) };
   expect(rgbaOf(readPicture(grey))).toEqual([7, 7, 7, 255, 255, 255, 255, 255]);
   expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(

@@ -141,6 +141,8 @@ describe("camera frames", () => {
     expect(() => readFrame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow(
       "has 11 bytes in rows of 6; expected 12",
     );
+    expect(() => readFrame({ width: 2, height: 2, step: 6, data: new Uint8Array(13) })).toThrow("13 bytes");
+    expect(() => readFrame({ width: 20, height: 10, data: new Uint8Array(300) })).toThrow("300 bytes");
     expect(() => readFrame({ width: -1, height: 2, step: 6, data: new Uint8Array(12) })).toThrow("-1 by 2 pixels");
     expect(() => readFrame({ width: 1e9, height: 1e9, step: 6, data: new Uint8Array(12) })).toThrow("pixels");
     expect(() => readFrame(null)).toThrow("no bytes");

@@ -29,9 +29,9 @@ export function readFrame(value: unknown): Frame {
   ) {
     throw new Error(`the camera's frame is ${String(width)} by ${String(height)} pixels; expected at least 1 by 1`);
   }
-  const row = typeof step === "number" && step > 0 ? step : data.length / height;
+  const row = typeof step === "number" && step > 0 ? step : width * Math.floor(data.length / width / height);
   const channels = row >= width * 3 ? 3 : 1;
-  if (row < width * channels || data.length < row * (height - 1) + width * channels) {
+  if (row < width * channels || data.length < row * (height - 1) + width * channels || data.length > row * height) {
     throw new Error(
       `the camera's frame has ${data.length} bytes in rows of ${row}; expected ${width * height * 3} for ${width} by ${height} pixels`,
     );

@@ -45,7 +45,7 @@ export function readPicture(value: unknown): Frame {
     throw new Error(`the picture is ${width} by ${height} pixels; expected at least 1 by 1`);
   const step = Number(info["step"]) || width * layout.bytes;
   const needed = step * (height - 1) + width * layout.bytes;
-  if (step < width * layout.bytes || data.length < needed)
+  if (step < width * layout.bytes || data.length < needed || data.length > step * height)
     throw new Error(
       `the picture has ${data.length} bytes in rows of ${step}; expected ${needed} for ${width} by ${height}`,
     );
