@@ -127,4 +127,18 @@ bool has_token(std::string_view list, std::string_view token) {
   return false;
 }
 
+bool accepts(std::string_view list, std::string_view name) {
+  const auto is_refusal = [](std::string_view parameter) {
+    parameter = rr::trim(parameter);
+    return equals_ignoring_case(parameter.substr(0, 2), "q=") &&
+           parameter.find_first_not_of("0.", 2) == std::string_view::npos;
+  };
+  for (const auto item : rr::split_words(list, ",")) {
+    const auto parts = rr::split_words(item, ";");
+    if (!parts.empty() && equals_ignoring_case(rr::trim(parts[0]), name))
+      return std::none_of(parts.begin() + 1, parts.end(), is_refusal);
+  }
+  return false;
+}
+
 }  // namespace rrgate

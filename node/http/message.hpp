@@ -69,6 +69,8 @@ std::string format_response_head(const Response& response, bool keeps_alive, uns
 
 /// Whether a comma-separated header value has `token`, in any case.
 bool has_token(std::string_view list, std::string_view token);
+/// Whether a header like Accept names it, in any case, and does not refuse it by q=0. Source: RFC 9110, section 12.4.2.
+bool accepts(std::string_view list, std::string_view name);
 bool equals_ignoring_case(std::string_view left, std::string_view right);
 
 }  // namespace rrgate

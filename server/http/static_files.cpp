@@ -36,23 +36,6 @@ bool is_safe_path(std::string_view path) {
   }
 }
 
-/// A token of Accept-Encoding that isn't refused by q=0.
-bool accepts_encoding(std::string_view header, std::string_view encoding) {
-  while (!header.empty()) {
-    const auto comma = header.find(',');
-    auto item = header.substr(0, comma);
-    const auto semicolon = item.find(';');
-    const auto parameters = semicolon == std::string_view::npos ? std::string_view() : item.substr(semicolon + 1);
-    item = item.substr(0, semicolon);
-    const bool is_refused = parameters.find("q=0") != std::string_view::npos &&
-                            parameters.find_first_of("123456789") == std::string_view::npos;
-    if (has_token(item, encoding)) return !is_refused;
-    if (comma == std::string_view::npos) break;
-    header.remove_prefix(comma + 1);
-  }
-  return false;
-}
-
 }  // namespace
 
 StaticFiles::StaticFiles(const fs::path& root) {
@@ -91,11 +74,11 @@ Response StaticFiles::answer(const Request& request, std::string_view path) {
   if (!decoded || !is_safe_path(*decoded)) return problem_response(404, "no such file");
   const auto file = root_ / *decoded;
 
-  const auto accepted = request.header(http::field::accept_encoding);
+  const auto accepted = request.list(http::field::accept_encoding);
   const Cached* found = nullptr;
   std::string_view encoding;
   for (const auto& [name, ending] : {std::pair("br", ".br"), std::pair("gzip", ".gz")}) {
-    if (found || !accepts_encoding(accepted, name)) continue;
+    if (found || !accepts(accepted, name)) continue;
     auto packed = file;
     packed += ending;
     found = load(packed);

@@ -3,10 +3,13 @@ import base64
 import functools
 import http.client
 import json
+import socket
 import struct
 import sys
 import threading
 import time
+
+import pytest
 
 from directions import DIRECTIONS, PEERS, service_command
 import http_api
@@ -302,6 +305,21 @@ def test_cbor(gateway):
     assert ask(gateway, "PUT", "/p_doubles", bytes.fromhex("d856480000000000000040"),
                headers={"Content-Type": "application/cbor"}).status == 204
     assert ask(gateway, "GET", "/p_doubles").json == [2.0]
+
+
+@pytest.mark.parametrize("accept, kind", [
+    ("application/cbor;q=0, application/json", "json"), ("application/json, application/cbor; q=0.000", "json"),
+    ("application/octet-stream;q=0, application/json", "json"), ("application/cbor-seq, application/json", "json"),
+    ("text/event-stream;q=0", "json"), ("Application/CBOR", "cbor"), ("application/cbor;v=1;q=0.5", "cbor"),
+    ("text/html\r\nAccept: application/cbor", "cbor"), ("*/*", "json")])
+def test_the_form_of_an_answer_is_one_that_is_accepted(gateway, accept, kind):
+    ask(gateway, "POST", "/publish_state", {"value": [1]})
+    with socket.create_connection(("127.0.0.1", gateway), 20) as link:
+        link.sendall(f"GET {BASE}/state HTTP/1.1\r\nHost: localhost\r\nAccept: {accept}\r\n\r\n".encode())
+        answer = http.client.HTTPResponse(link)
+        answer.begin()
+        assert answer.headers["Content-Type"] == "application/" + kind
+        answer.close()
 
 
 def test_streams_are_text_also_for_readers_of_cbor(gateway):

@@ -104,6 +104,14 @@ def test_rows_may_be_longer_than_their_pixels(gateway):
     assert image.tobytes() == Image.frombytes("RGB", (5, 4), b"".join(row[:15] for row in rows), "raw", "BGR").tobytes()
 
 
+@pytest.mark.parametrize("accept, kind", [
+    ("image/png;q=0, image/jpeg", JPEG), ("image/JPEG", JPEG), ("image/png-x, image/jpeg", JPEG),
+    ("image/*;q=0, application/json", "application/json")])
+def test_an_image_is_of_an_accepted_type(gateway, accept, kind):
+    put(gateway, 2, 2, "mono8", bytes(4))
+    assert get(gateway, accept=accept).headers["Content-Type"] == kind
+
+
 def test_functions_and_wires(gateway):
     answer = ask(gateway, "POST", "/capture", {"width": 16, "height": 4}, headers={"Accept": PNG}, base=BASE)
     assert Image.open(io.BytesIO(answer.body)).tobytes() == bytes(range(64))

@@ -176,6 +176,7 @@ TEST_CASE("static files carry type, tag and cache rules") {
   CHECK(header(brotli, "Content-Type") == "text/javascript; charset=utf-8");
   CHECK(header(brotli, "ETag") != header(script, "ETag"));
   CHECK(*get("assets/app-Bx81Qz0k.js", {{"Accept-Encoding", "br;q=0, gzip;q=0.5"}}).body == "gzip");
+  CHECK(*get("assets/app-Bx81Qz0k.js", {{"Accept-Encoding", "deflate"}, {"Accept-Encoding", "BR"}}).body == "brotli");
 }
 
 TEST_CASE("a folder is the page in it") {

@@ -13,10 +13,6 @@ namespace rrgate {
 
 namespace {
 
-bool accepts_type(std::string_view header, std::string_view type) {
-  return header.find(type) != std::string_view::npos;
-}
-
 std::string_view media_type(std::string_view header) {
   const auto type = header.substr(0, header.find(';'));
   return type.substr(0, type.find_last_not_of(' ') + 1);
@@ -128,16 +124,15 @@ rr::JsonForm json_form(const Request& request) {
 }
 
 ObjectRequest::ObjectRequest(ResponseWriter& writer, GatewayState& gateway) : writer_(writer), gateway_(gateway) {
-  const auto accept = request().header(http::field::accept);
-  wants_events_ = accepts_type(accept, "text/event-stream");
-  if (accepts_type(accept, "application/cbor")) wanted_ = BodyForm::cbor;
-  if (accepts_type(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
+  const auto accept = request().list(http::field::accept);
+  wants_events_ = accepts(accept, "text/event-stream");
+  if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
+  if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
   const auto as = option("as").value_or("");
-  wants_motion_ = as == "mjpeg" || (as.empty() && accepts_type(accept, "multipart/x-mixed-replace"));
-  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts_type(accept, jpeg_type));
-  const bool takes_png =
-      as == "png" || (as.empty() && (accepts_type(accept, png_type) || accepts_type(accept, "image/*")));
-  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts_type(accept, png_type) ? jpeg_type : png_type;
+  wants_motion_ = as == "mjpeg" || (as.empty() && accepts(accept, "multipart/x-mixed-replace"));
+  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts(accept, jpeg_type));
+  const bool takes_png = as == "png" || (as.empty() && (accepts(accept, png_type) || accepts(accept, "image/*")));
+  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts(accept, png_type) ? jpeg_type : png_type;
   if (as == "jpeg") wanted_image_ = jpeg_type;
   form_ = json_form(request());
   form_.has_bytes = wanted_ == BodyForm::cbor;
