@@ -157,6 +157,11 @@ def test_memories(gateway):
     assert (part.status, part.body, part.headers["Content-Range"]) == (206, bytes([2, 3, 4]), "bytes 2-4/10")
     tail = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream", "Range": "bytes=-3"})
     assert tail.body == bytes([7, 8, 9])
+    ranged = {"Accept": "application/octet-stream", "Range": "bytes=2-4"}
+    changed = ask(gateway, "GET", "/m_fixed", headers={**ranged, "If-Range": '"abc"'})
+    assert (changed.status, changed.body) == (200, bytes(range(10)))
+    head = ask(gateway, "HEAD", "/m_fixed", headers=ranged)
+    assert (head.status, head.headers["Content-Length"]) == (200, "10")
     beyond = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream", "Range": "bytes=10-"})
     assert (beyond.status, beyond.headers["Content-Range"]) == (416, "bytes */10")
     within = ask(gateway, "GET", "/m_large", headers={"Accept": "application/octet-stream", "Range": "bytes=9-16"})
@@ -183,6 +188,9 @@ def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gate
     for encoding in ("gzip", "identity, br"):
         packed = ask(gateway, "PUT", "/m_numbers", bytes(16), {**numbers, "Content-Encoding": encoding})
         assert packed.status == 415 and encoding in packed.json["detail"]
+    for conditions in ({"If-Match": '"x"'}, {"If-Match": 'W/"x", "y"'}, {"If-None-Match": "*"}):
+        for path, value in (("/m_numbers", [9, 9]), ("/p_double", 9)):
+            assert ask(gateway, "PUT", path, value, conditions).status == 412
     longer = ask(gateway, "PUT", "/m_numbers?offset=1&count=1", [9, 9, 9])
     assert (longer.status, longer.json["error"]["name"]) == (400, "RobotRaconteur.InvalidArgument")
     assert "3 items" in longer.json["detail"]
@@ -190,6 +198,8 @@ def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gate
     assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 2, 3, 4]
     assert ask(gateway, "PUT", "/m_numbers?offset=1&count=2", [20, 30], {"Range": "bytes=0-7"}).status == 204  # it is of GET alone
     assert ask(gateway, "GET", "/m_numbers?count=4").json == [1, 20, 30, 4]
+    assert ask(gateway, "PUT", "/m_numbers", [1, 20], {"If-Match": "*"}).status == 204
+    assert ask(gateway, "PUT", "/m_numbers", [1, 20], {"If-None-Match": '"x"'}).status == 204
     assert ask(gateway, "PUT", "/m_numbers", struct.pack("<d", 5), {**numbers, "Content-Encoding": "identity"}).status == 204
     assert ask(gateway, "GET", "/m_numbers?count=2").json == [5, 20]
 

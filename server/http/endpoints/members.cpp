@@ -127,7 +127,11 @@ rr::awaitable<Response> answer_memory_bytes(const ObjectRequest& request, const 
                                             std::size_t item_bytes) {
   const auto size = length * item_bytes;
   bool is_unsatisfiable = false;
-  const auto range = read_range(request.request().header(http::field::range), size, is_unsatisfiable);
+  // RFC 9110, sections 14.2 and 13.1.5: of GET alone, and values have nothing that If-Range could name.
+  const bool takes_range =
+      request.method() == http::verb::get && request.request().header(http::field::if_range).empty();
+  const auto asked = takes_range ? request.request().header(http::field::range) : std::string_view();
+  const auto range = read_range(asked, size, is_unsatisfiable);
   if (is_unsatisfiable) {
     auto response = problem_response(416, "the memory has " + std::to_string(size) + " bytes");
     response.set("Content-Range", "bytes */" + std::to_string(size));
@@ -205,6 +209,13 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   co_return co_await request.value_response(target, items);
 }
 
+/// What If-Match and If-None-Match say of a value, which is always there and has no ETag. Source: RFC 9110,
+/// section 13.1.
+bool may_replace(const Request& request) {
+  const auto wanted = request.list(http::field::if_match);
+  return (wanted.empty() || wanted == "*") && request.list(http::field::if_none_match) != "*";
+}
+
 }  // namespace
 
 rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectRequest& request,
@@ -224,6 +235,11 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
     refuse(rr::ErrorCode::invalid_argument,
            "Content-Range is not for values; a part of a memory is written with ?offset=");
   Response response;
+  if (request.method() == http::verb::put && !may_replace(request.request())) {
+    response = problem_response(412, "the value is there, and has no ETag that If-Match could name");
+    co_await request.writer().send(response);
+    co_return;
+  }
   switch (target.member->kind) {
     case rr::MemberKind::property:
       response = co_await answer_value(request, target, rr::CallKind::property_get, rr::CallKind::property_set);
