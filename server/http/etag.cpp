@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "core/support/words.hpp"
+
 namespace rrgate {
 
 /// FNV-1a: an ETag must differ when the content does, not resist an attacker.
@@ -14,10 +16,19 @@ std::string make_etag(std::string_view content, std::string_view suffix) {
   return std::string(text) + std::string(suffix) + "\"";
 }
 
+bool has_etag(const Request& request, std::string_view etag) {
+  const auto list = request.list(http::field::if_none_match);
+  for (auto known : rr::split_words(list, ", \t")) {
+    if (known.starts_with("W/")) known.remove_prefix(2);
+    if (known == etag || known == "*") return true;
+  }
+  return false;
+}
+
 Response with_etag(Response response, const Request& request) {
   const auto etag = make_etag(*response.body);
   response.set("ETag", etag).set("Cache-Control", "no-cache");
-  if (!has_token(request.header(http::field::if_none_match), etag)) return response;
+  if (!has_etag(request, etag)) return response;
   response.status = 304;
   response.body = nullptr;
   return response;

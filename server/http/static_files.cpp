@@ -95,7 +95,7 @@ Response StaticFiles::answer(const Request& request, std::string_view path) {
   response.set("Cache-Control", has_content_hash(name) ? "public, max-age=31536000, immutable" : "no-cache");
   if (!encoding.empty()) response.set("Content-Encoding", std::string(encoding));
   response.set("Content-Security-Policy", std::string(content_security_policy));  // the script of a worker has its own
-  if (has_token(request.header(http::field::if_none_match), found->etag)) {
+  if (has_etag(request, found->etag)) {
     response.status = 304;
   } else {
     response.body = found->content;

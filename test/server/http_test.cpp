@@ -162,9 +162,14 @@ TEST_CASE("static files carry type, tag and cache rules") {
       Catch::StartsWith("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws: wss:"));
   CHECK(header(get("assets/client.wasm"), "Content-Type") == "application/wasm");
 
-  const auto again = get("", {{"If-None-Match", header(index, "ETag")}});
-  CHECK(again.status == 304);
-  CHECK_FALSE(again.body);
+  const auto etag = header(index, "ETag");
+  for (const auto& known : {etag, "W/" + etag, "\"other\", W/" + etag, std::string("*")}) {
+    INFO(known);
+    const auto again = get("", {{"If-None-Match", known}});
+    CHECK(again.status == 304);
+    CHECK_FALSE(again.body);
+  }
+  CHECK(get("", {{"If-None-Match", "\"other\", W/\"another\""}}).status == 200);
 
   const auto script = get("assets/app-Bx81Qz0k.js");
   CHECK(*script.body == "script");
@@ -233,6 +238,8 @@ TEST_CASE("the documentation is below a path as at the root of a host") {
   auto known = request(http::verb::get, "/docs/page.html");
   known.arrival.prefix = "/a/b";
   known.message.set(http::field::if_none_match, header(get("/docs/page.html"), "ETag"));
+  CHECK(gateway.router().answer(known).status == 304);
+  known.message.set(http::field::if_none_match, "W/" + header(get("/docs/page.html"), "ETag"));
   CHECK(gateway.router().answer(known).status == 304);
 }
 
