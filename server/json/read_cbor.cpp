@@ -85,7 +85,9 @@ class CborReader {
   bool read_piece(const CborHead& head, Out& out);
   bool read_text(const CborHead& head, std::string& out);
   bool read_bytes(const CborHead& head, std::optional<std::uint64_t> tag);
-  bool fail_here() { return builder_.fail("is no CBOR at byte " + std::to_string(item_at_)); }
+  bool fail_here(const char* why = "is no CBOR") {
+    return builder_.fail(std::string(why) + " at byte " + std::to_string(item_at_));
+  }
 
   ByteSpan bytes_;
   std::size_t at_ = 0;
@@ -149,7 +151,7 @@ bool CborReader::read_key() {
   CborHead head;
   std::string key;
   if (!read_head(head)) return false;
-  if (head.type != CborType::text) return fail_here();
+  if (head.type != CborType::text) return fail_here("has a key that is no text");
   return read_text(head, key) && builder_.set_key(std::move(key));
 }
 
@@ -160,6 +162,8 @@ bool CborReader::read_simple(const CborHead& head) {
       return builder_.add_value(head.detail == 21);
     case 22:
       return builder_.add_value(nullptr);
+    case 23:
+      return fail_here("has undefined, which is no value,");
     case 25:
       return builder_.add_value(half_precision(head.number));
     case 26:

@@ -70,7 +70,9 @@ TEST_CASE("cbor: what is malformed says where") {
   CHECK(shown("7bffffffffffffffff61") == "CBOR is no CBOR at byte 0");
   CHECK(shown("7f4161ff") == "CBOR is no CBOR at byte 1");
   CHECK(shown("7f7f6161ffff") == "CBOR is no CBOR at byte 1");
-  CHECK(shown("a10101") == "CBOR is no CBOR at byte 1");
+  CHECK(shown("a10101") == "CBOR has a key that is no text at byte 1");
+  CHECK(shown("a2 6161 01 20 01") == "CBOR has a key that is no text at byte 4");
+  CHECK(shown("81f7") == "CBOR has undefined, which is no value, at byte 1");
   CHECK(shown("9bffffffffffffffff00") == "CBOR is no CBOR at byte 10");
   CHECK(shown("a2616101616102") == "CBOR has the key 'a' twice");
   CHECK(shown("c11a514b67b0") == "CBOR has the tag 1 before what is no bytes (byte 1)");
