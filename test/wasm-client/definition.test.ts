@@ -24,6 +24,11 @@ import test.library
 ## How fast it may go.
 constant double LIMIT 2.5
 constant int32 HEX -0x10
+constant int32 PLUS +0x10
+constant single TENTH 0.1
+constant single ODD 16777217
+constant int64 LEAST -9223372036854775808
+constant uint64[] MORE {+0x10, 3}
 constant int64 HUGE 9223372036854775807
 constant uint64[] BIG {1, 18446744073709551615}
 constant int16[3] THREE {-1, 0x10, 3}
@@ -74,6 +79,11 @@ it("gives constants as values of their types", async () => {
   expect({ ...constants }).toEqual({
     LIMIT: 2.5,
     HEX: -16,
+    PLUS: 16,
+    TENTH: 0.10000000149011612,
+    ODD: 16777216,
+    LEAST: -9223372036854775808n,
+    MORE: BigUint64Array.of(16n, 3n),
     HUGE: 9223372036854775807n,
     BIG: BigUint64Array.of(1n, 18446744073709551615n),
     THREE: Int16Array.of(-1, 16, 3),

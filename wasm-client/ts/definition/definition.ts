@@ -103,11 +103,12 @@ function parseConstant({ type, text }: RawConstant, valueOf: (name: string) => R
     .map((word) => word.trim())
     .filter((word) => word !== "");
   if (base in numberArrays) {
-    const numbers = words.map((word) => (word.startsWith("-") ? -Number(word.slice(1)) : Number(word)));
-    return items === undefined ? (numbers[0] ?? 0) : (numberArrays[base]?.from(numbers) ?? null);
+    const numbers = words.map((word) => signed(word, Number));
+    if (items !== undefined) return numberArrays[base]?.from(numbers) ?? null;
+    return base === "single" ? Math.fround(numbers[0] ?? 0) : (numbers[0] ?? 0);
   }
   if (base === "int64" || base === "uint64") {
-    const numbers = words.map((word) => (word.startsWith("-") ? -BigInt(word.slice(1)) : BigInt(word)));
+    const numbers = words.map((word) => signed(word, BigInt));
     if (items === undefined) return numbers[0] ?? 0n;
     return (base === "int64" ? BigInt64Array : BigUint64Array).from(numbers);
   }
@@ -117,6 +118,12 @@ function parseConstant({ type, text }: RawConstant, valueOf: (name: string) => R
       return [name.trim(), valueOf(constant.trim())];
     }),
   );
+}
+
+/** JavaScript takes no sign before "0x". */
+function signed<T extends number | bigint>(word: string, read: (digits: string) => T): T {
+  const value = read(word.replace(/^[+-]/, ""));
+  return word.startsWith("-") ? (-value as T) : value;
 }
 
 /** Without prototype: names are what services like. */
