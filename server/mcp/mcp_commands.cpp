@@ -148,14 +148,16 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
   const auto& target = *command.target;
   allow(target, verb);
   const auto& member = commanded_member(target, verb);
-  const rr::JsonForm form;
+  const JsonMaking making{gateway_.workers(), {}};
+  const auto& form = making.form;
   if (const auto* most = arguments->find("most")) command.most = count_of(*most, "most", most_results);
   command.called = target.request(verb == Verb::call ? rr::CallKind::function : rr::CallKind::property_set);
   if (verb == Verb::call) {
-    command.called.arguments = arguments_of(*arguments, target, form);
+    command.called.arguments = co_await arguments_of(*arguments, target, making);
     command.values = value_or_throw(arguments_to_json(command.called.arguments, member, target.types(), form));
   } else {
-    command.called.arguments.push_back(value_of(*arguments, target, member.type, member.name, form));
+    auto given = co_await value_of(*arguments, target, member.type, member.name, making);
+    command.called.arguments.push_back(std::move(given));
     command.values = rr::OrderedJson::object();
     rr::add_key(command.values, member.name) = to_json(target, command.called.arguments.front(), form);
   }

@@ -133,8 +133,8 @@ McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr targe
     co_return out;
   }
   if (member.kind == rr::MemberKind::memory) {
-    const rr::JsonForm form;
-    auto items = co_await read_memory(arguments, target, form);
+    const JsonMaking making{gateway_.workers(), {}};
+    auto items = co_await read_memory(arguments, target, making);
     rr::add_key(out, from_device) = std::move(items);
     co_return out;
   }

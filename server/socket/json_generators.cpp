@@ -16,7 +16,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, Targ
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
     refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
-  auto arguments = arguments_of(*request, *target, place_.form);
+  auto arguments = co_await arguments_of(*request, *target, making_);
+  if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   const auto reserved = reserve(*request);
   Generator generator{target, target->client->next_generator()};
   auto opening = target->request(rr::CallKind::generator_open);
@@ -56,7 +57,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
   step.generator = generator.id;
   if (takes_values(*target->member)) {
     const auto& taken = target->member->parameters.back();
-    step.arguments.push_back(value_of(*request, *target, taken.type, taken.name, place_.form));
+    auto given = co_await value_of(*request, *target, taken.type, taken.name, making_);
+    step.arguments.push_back(std::move(given));
   }
   rr::Value value;
   std::optional<rr::Error> error;
@@ -72,7 +74,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
     rr::add_key(out, "done") = true;
     co_return out;
   }
-  rr::add_key(out, "value") = to_json(*target, value, place_.form);
+  auto json = co_await json_of(*target, value, making_);
+  rr::add_key(out, "value") = std::move(json);
   rr::add_key(out, "done") = false;
   co_return out;
 }

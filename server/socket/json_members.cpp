@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/types/value_size.hpp"
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/upstream/lease_table.hpp"
 
@@ -31,77 +33,94 @@ void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection ne
          rr::quote(member.name) + (is_read_only ? " can only be read" : " can only be written"));
 }
 
-rr::Value value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
-                   const std::string& name, const rr::JsonForm& form) {
-  return value_or_throw(rr::value_from_json(request.at("value"), type, target.types(), form, name));
+rr::awaitable<rr::Value> value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
+                                  const std::string& name, const JsonMaking& how) {
+  const auto& json = request.at("value");
+  const auto make = [&] { return rr::value_from_json(json, type, target.types(), how.form, name); };
+  if (!request.is_large() || !is_apart(type)) co_return value_or_throw(make());
+  co_return value_or_throw(co_await how.workers.run(make));
 }
 
-std::vector<rr::Value> arguments_of(const JsonRequest& request, const Target& target, const rr::JsonForm& form) {
+rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target,
+                                                   const JsonMaking& how) {
   static const auto none = rr::Json::object();
   const auto* given = request.find("args");
-  return value_or_throw(arguments_from_json(given ? *given : none, *target.member, target.types(), form));
+  const auto& parameters = target.member->parameters;
+  const bool are_apart =
+      std::all_of(parameters.begin(), parameters.end(), [](const auto& each) { return is_apart(each.type); });
+  const auto make = [&] {
+    return arguments_from_json(given ? *given : none, *target.member, target.types(), how.form);
+  };
+  if (!request.is_large() || !are_apart) co_return value_or_throw(make());
+  co_return value_or_throw(co_await how.workers.run(make));
 }
 
-JsonAnswer describe_target(JsonRequestPtr, TargetPtr target, rr::JsonForm) {
+rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const JsonMaking& how) {
+  const auto make = [&] { return to_json(target, value, how.form); };
+  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type)) co_return make();
+  co_return co_await how.workers.run(make);
+}
+
+JsonAnswer describe_target(JsonRequestPtr, TargetPtr target, JsonMaking) {
   expect_object(*target, rr::quote(name_of(*target)) + " is no object");
   co_return describe_object(*target);
 }
 
-JsonAnswer get_value(JsonRequestPtr, TargetPtr target, rr::JsonForm form) {
+JsonAnswer get_value(JsonRequestPtr, TargetPtr target, JsonMaking how) {
   const auto& member = expect_member(*target, "get", {rr::MemberKind::property, rr::MemberKind::wire});
   expect_direction(member, rr::MemberDirection::writeonly);
-  const auto how = member.kind == rr::MemberKind::property ? rr::CallKind::property_get : rr::CallKind::peek_in;
-  const auto value = co_await target->ask(how);
-  co_return to_json(*target, value, form);
+  const auto kind = member.kind == rr::MemberKind::property ? rr::CallKind::property_get : rr::CallKind::peek_in;
+  const auto value = co_await target->ask(kind);
+  co_return co_await json_of(*target, value, how);
 }
 
-JsonAnswer set_value(JsonRequestPtr request, TargetPtr target, rr::JsonForm form) {
+JsonAnswer set_value(JsonRequestPtr request, TargetPtr target, JsonMaking how) {
   const auto& member = expect_member(*target, "set", {rr::MemberKind::property, rr::MemberKind::wire});
   expect_direction(member, rr::MemberDirection::readonly);
-  const auto how = member.kind == rr::MemberKind::property ? rr::CallKind::property_set : rr::CallKind::poke_out;
-  auto value = value_of(*request, *target, member.type, member.name, form);
-  co_await target->ask(how, std::move(value));
+  const auto kind = member.kind == rr::MemberKind::property ? rr::CallKind::property_set : rr::CallKind::poke_out;
+  auto value = co_await value_of(*request, *target, member.type, member.name, how);
+  co_await target->ask(kind, std::move(value));
   co_return nullptr;
 }
 
-JsonAnswer call_function(JsonRequestPtr request, TargetPtr target, rr::JsonForm form) {
+JsonAnswer call_function(JsonRequestPtr request, TargetPtr target, JsonMaking how) {
   const auto& member = expect_member(*target, "call", {rr::MemberKind::function});
   if (member.is_generator())
     refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is a generator; use \"open\"");
   auto called = target->request(rr::CallKind::function);
-  called.arguments = arguments_of(*request, *target, form);
+  called.arguments = co_await arguments_of(*request, *target, how);
   const auto value = co_await target->client->ask(std::move(called));
-  co_return to_json(*target, value, form);
+  co_return co_await json_of(*target, value, how);
 }
 
-JsonAnswer get_shape(JsonRequestPtr, TargetPtr target, rr::JsonForm) {
+JsonAnswer get_shape(JsonRequestPtr, TargetPtr target, JsonMaking) {
   expect_member(*target, "shape", {rr::MemberKind::memory});
   const auto sizes = co_await memory_shape(*target);
   co_return rr::OrderedJson(sizes);
 }
 
-JsonAnswer read_memory(JsonRequestPtr request, TargetPtr target, rr::JsonForm form) {
+JsonAnswer read_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how) {
   const auto& member = expect_member(*target, "read", {rr::MemberKind::memory});
   expect_direction(member, rr::MemberDirection::writeonly);
   const auto sizes = co_await memory_shape(*target);
   const auto offset = request->numbers("offset", sizes.size());
   const auto count = request->numbers("count", sizes.size());
   const auto items = co_await read_items(*target, sizes, offset, count);
-  co_return to_json(*target, items, form);
+  co_return co_await json_of(*target, items, how);
 }
 
-JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, rr::JsonForm form) {
+JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how) {
   const auto& member = expect_member(*target, "write", {rr::MemberKind::memory});
   expect_direction(member, rr::MemberDirection::readonly);
   const auto sizes = co_await memory_shape(*target);
   const auto offset = request->numbers("offset", sizes.size());
   const auto count = request->numbers("count", sizes.size());
-  auto items = value_of(*request, *target, member.type, member.name, form);
+  auto items = co_await value_of(*request, *target, member.type, member.name, how);
   co_await write_items(*target, sizes, offset, count, std::move(items));
   co_return nullptr;
 }
 
-JsonAnswer lock_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm) {
+JsonAnswer lock_object(JsonRequestPtr request, TargetPtr target, JsonMaking) {
   expect_object(*target, "objects are locked, not their members");
   const auto kind = request->text("kind", "client");
   if (kind != "client" && kind != "user")
@@ -112,13 +131,13 @@ JsonAnswer lock_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm) {
   co_return nullptr;
 }
 
-JsonAnswer unlock_object(JsonRequestPtr, TargetPtr target, rr::JsonForm) {
+JsonAnswer unlock_object(JsonRequestPtr, TargetPtr target, JsonMaking) {
   auto path = target->path();
   co_await target->client->lock(rr::LockCommand::unlock, std::move(path));
   co_return nullptr;
 }
 
-JsonAnswer lease_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm) {
+JsonAnswer lease_object(JsonRequestPtr request, TargetPtr target, JsonMaking) {
   expect_object(*target, "leases are of objects, not of their members");
   const auto& deadman = request->at("deadman");
   if (!deadman.is_number_unsigned() || deadman.get<std::uint64_t>() > std::uint64_t(longest_deadman.count()))
@@ -134,13 +153,13 @@ JsonAnswer lease_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm) 
   co_return nullptr;
 }
 
-JsonAnswer renew_lease(JsonRequestPtr, TargetPtr target, rr::JsonForm) {
+JsonAnswer renew_lease(JsonRequestPtr, TargetPtr target, JsonMaking) {
   auto path = target->path();
   co_await target->client->lock(rr::LockCommand::renew_lease, std::move(path));
   co_return nullptr;
 }
 
-JsonAnswer release_lease(JsonRequestPtr, TargetPtr target, rr::JsonForm) {
+JsonAnswer release_lease(JsonRequestPtr, TargetPtr target, JsonMaking) {
   auto path = target->path();
   co_await target->client->lock(rr::LockCommand::release_lease, std::move(path));
   co_return nullptr;

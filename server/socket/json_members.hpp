@@ -29,24 +29,35 @@ void expect_object(const Target& target, const std::string& message);
 /// Throws   read_only_member, write_only_member: the member has the direction `never`.
 void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection never);
 
+/// How values are read and written for a socket: on a worker those that are large and apart, as is_apart() says.
+struct JsonMaking {
+  Workers& workers;
+  rr::JsonForm form;
+};
+
+// These borrow for the wait.
+
 /// The request's "value", as one of `type`. `name`  of errors.
-rr::Value value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
-                   const std::string& name, const rr::JsonForm& form);
+rr::awaitable<rr::Value> value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
+                                  const std::string& name, const JsonMaking& how);
 /// The request's "args", for the target's function.
-std::vector<rr::Value> arguments_of(const JsonRequest& request, const Target& target, const rr::JsonForm& form);
+rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target,
+                                                   const JsonMaking& how);
+/// A value of the target's, of the type of its member.
+rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const JsonMaking& how);
 
 using JsonAnswer = rr::awaitable<rr::OrderedJson>;
-JsonAnswer describe_target(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer get_value(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer set_value(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer call_function(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer get_shape(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer read_memory(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer lock_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer unlock_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer lease_object(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer renew_lease(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
-JsonAnswer release_lease(JsonRequestPtr request, TargetPtr target, rr::JsonForm form);
+JsonAnswer describe_target(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer get_value(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer set_value(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer call_function(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer get_shape(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer read_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer lock_object(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer unlock_object(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer lease_object(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer renew_lease(JsonRequestPtr request, TargetPtr target, JsonMaking how);
+JsonAnswer release_lease(JsonRequestPtr request, TargetPtr target, JsonMaking how);
 
 }  // namespace rrgate

@@ -36,7 +36,7 @@ rr::Error error_of(const std::exception_ptr& thrown) {
 
 template <auto Answer>
 rr::awaitable<rr::OrderedJson> JsonOperations::pass_on(JsonRequestPtr request, TargetPtr target) {
-  return Answer(std::move(request), std::move(target), place_.form);
+  return Answer(std::move(request), std::move(target), making_);
 }
 
 const JsonOperations::Operation JsonOperations::operations[] = {
@@ -82,6 +82,7 @@ const JsonOperations::Operation* JsonOperations::find_operation(std::string_view
 JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<Outbox> outbox)
     : gateway_(gateway),
       place_(std::move(place)),
+      making_{gateway.workers(), place_.form},
       outbox_(std::move(outbox)),
       questions_(place_.device->executor(), place_.form, outbox_),
       sent_(place_.device->executor()) {}
@@ -115,13 +116,13 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   else
     read = parse();
   if (!read) co_return tell_error("null", read.error());
-  const auto request = std::make_shared<const JsonRequest>(std::move(*read));
+  JsonRequestPtr request = std::make_shared<const JsonRequest>(std::move(*read));
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   const bool passes = operation && (operation->traits.gives_back || is_urgent(*request, *operation));
   if (!has_room && !passes) co_return tell_no_room(request->id());
   if (operation && operation->traits.keeps_order && !passes) {
-    co_await queue(request, std::move(memory));
+    co_await queue(std::move(request), std::move(memory));
     co_return;
   }
   if (running_ >= (passes ? 2 * max_running : max_running))
@@ -141,10 +142,10 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   }
   ++running_;
   if (operation && operation->traits.comes_first)
-    co_await run(shared_from_this(), request, std::move(held), std::move(memory));
+    co_await run(shared_from_this(), std::move(request), std::move(held), std::move(memory));
   else
-    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(held), std::move(memory)),
-                   asio::detached);
+    asio::co_spawn(place_.device->executor(),
+                   run(shared_from_this(), std::move(request), std::move(held), std::move(memory)), asio::detached);
 }
 
 rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::Charge memory) {
@@ -169,10 +170,10 @@ rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::
 rr::awaitable<void> JsonOperations::send_queued(std::shared_ptr<JsonOperations> self) {
   auto& packets = self->packets_;
   while (!packets.empty()) {
-    const auto request = packets.front().request;
+    auto request = std::move(packets.front().request);
     const Passes none;
     ++self->running_;
-    co_await run(self, request, none, std::move(packets.front().memory));
+    co_await run(self, std::move(request), none, std::move(packets.front().memory));
     packets.pop_front();
     if (self->is_stopped_) packets.clear();
     self->last_sent_ = std::chrono::steady_clock::now();
@@ -196,13 +197,14 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Js
   std::optional<rr::Error> error;
   std::string answer;
   try {
-    const auto result = co_await self->perform(request);
-    const auto write = [&request, &result] { return json_answer(request->id(), result); };
+    auto result = co_await self->perform(request);
     const bool is_wanted = request->id() != "null";
-    if (is_wanted && held_bytes(result) <= large_json_bytes)
+    const bool is_large = held_bytes(result) > large_json_bytes;
+    auto write = [id = request->id(), result = std::move(result)] { return json_answer(id, result); };
+    if (is_wanted && !is_large)
       answer = write();
     else if (is_wanted)
-      answer = co_await self->gateway_.workers().run(write);
+      answer = co_await self->gateway_.workers().run(std::move(write));
   } catch (...) {
     error = error_of(std::current_exception());
   }
@@ -211,6 +213,9 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Js
     self->tell_error(request->id(), *error);
   else if (!answer.empty())
     self->outbox_->add(std::move(answer));
+  if (!request->is_large()) co_return;
+  auto free = [freed = std::move(request)] { return freed.use_count(); };
+  co_await self->gateway_.workers().run(std::move(free));
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request) {

@@ -138,6 +138,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   GatewayState& gateway_;
   JsonSocketPlace place_;
+  const JsonMaking making_;
   std::shared_ptr<Outbox> outbox_;
   std::shared_ptr<ValueClient> own_;  ///< once something needs it; then everything uses it
   std::map<std::string, Open> open_;

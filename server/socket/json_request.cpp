@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/refusal.hpp"
 #include "server/json/value_to_json.hpp"
 
@@ -20,7 +21,9 @@ bool is_id(const rr::Json& json) {
 rr::Result<JsonRequest> JsonRequest::from_text(std::string_view message) {
   auto json = rr::read_json(message);
   if (!json) return json.error();
-  return from_json(std::move(*json));
+  auto request = from_json(std::move(*json));
+  if (request) request->is_large_ = message.size() > large_json_bytes;
+  return request;
 }
 
 rr::Result<JsonRequest> JsonRequest::from_json(rr::Json message) {

@@ -22,6 +22,8 @@ class JsonRequest {
 
   /// As JSON; "null" without one.
   const std::string& id() const { return id_; }
+  /// Its text was longer than large_json_bytes: to read it on, or to free it, is for a worker.
+  bool is_large() const { return is_large_; }
   /// Null where it is not there.
   const rr::Json* find(std::string_view name) const;
 
@@ -36,6 +38,7 @@ class JsonRequest {
 
   rr::Json message_;
   std::string id_ = "null";
+  bool is_large_ = false;
 };
 
 // Texts of messages to the client. `id` is that of a request; `retry_after` the seconds until it may be asked again.
