@@ -144,24 +144,43 @@ class Seating {
   }
   void get_up() { seat_.reset(); }
 
+  /// Whose seat it is.
+  std::weak_ptr<SharedClient> session;
+
  private:
   GatewayState& gateway_;
   std::optional<Device::Seat> seat_;
 };
 
+/// Another gateway shows its clients that a device is away only where it gets no session itself: others are let in, and
+/// wait. Who may see nothing of a device is told nothing by the index of its node.
+/// `device_of_node`  empty: the gateway's own node. Errors   connection_error: the device is away.
+rr::Result<> check_presence(GatewayState& gateway, const SharedNode& node, const std::string& device_of_node,
+                            const Identity& who, std::string_view service) {
+  if (const auto shared = node.find_service(service)) {
+    const auto& session = *shared->upstream();
+    return session.is_lost() && !session.is_resting() ? rr::Result<>(session.lost_error()) : rr::Result<>();
+  }
+  const auto* device = gateway.devices().find(device_of_node);
+  const bool is_away = device && device->state() != DeviceState::online;
+  return is_away && gateway.access().sees(who, device_of_node) ? rr::Result<>(device->away_error()) : rr::Result<>();
+}
+
 /// What a session asks before it does anything, or tells of anything.
-auto make_admission(GatewayState& gateway, const SharedNode& node, std::string peer,
-                    std::shared_ptr<SessionRights> rights, std::shared_ptr<Seating> seating) {
-  return [&gateway, &node, peer = std::move(peer), rights = std::move(rights),
+auto make_admission(GatewayState& gateway, const SharedNode& node, std::string device_of_node,
+                    const Connection& connection, std::shared_ptr<SessionRights> rights,
+                    std::shared_ptr<Seating> seating) {
+  return [&gateway, &node, device_of_node = std::move(device_of_node), peer = connection.client,
+          who = connection.identity, rights = std::move(rights),
           seating = std::move(seating)](const rr::MemberAccess& wanted) -> rr::Result<> {
     const bool connects =
         wanted.type == rr::EntryType::connect_client || wanted.type == rr::EntryType::connect_client_combined;
     auto allowed = rights->admit(wanted, is_vital(gateway, node, wanted));
     if (!connects) return allowed;
-    if (!allowed)
-      gateway.reject(allowed.error());
-    else
-      allowed = seating->sit_down(node.device_of(wanted.path));
+    if (!allowed) gateway.reject(allowed.error());
+    if (const auto session = seating->session.lock(); allowed && session && session->is_gateway())
+      allowed = check_presence(gateway, node, device_of_node, who, wanted.path);
+    if (allowed) allowed = seating->sit_down(node.device_of(wanted.path));
     if (!allowed)
       gateway.log_refusal(LogLevel::info, "client refused", peer, {{"peer", peer}, {"error", allowed.error().message}});
     return allowed;
@@ -188,14 +207,14 @@ auto explain_missing(GatewayState& gateway, const Connection& connection, const 
 /// Whoever waits for the end of the session is woken by `ended`.
 std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& connection, Destination destination,
                                             std::unique_ptr<rr::ByteStream> client, std::string base_url,
-                                            std::shared_ptr<Seating> seating, std::function<void()> ended) {
+                                            const std::shared_ptr<Seating>& seating, std::function<void()> ended) {
   const auto device = destination.device ? destination.device->config().name : std::string();
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival{
       .from = {connection.client, connection.network, connection.identity.face},
       .base_url = std::move(base_url),
-      .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
+      .admit = make_admission(gateway, *destination.node, device, connection, rights, seating),
       .enter = make_entrance(gateway, *destination.node, connection, rights),
       .why_missing = explain_missing(gateway, connection, device),
       .lock_rights = {
@@ -208,6 +227,7 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
       .is_encrypted = connection.peer.is_encrypted,
       .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
+  seating->session = session;
   connection.device = destination.device ? destination.device->shared_from_this() : nullptr;
   connection.has_session = true;
   connection.is_good = [rights, session] {

@@ -245,8 +245,17 @@ void SharedClient::close_pipe(rr::PipeId id) {
 /// A packet that does not fit would be lost without anybody knowing: the client goes, and knows.
 void SharedClient::end_too_slow(const rr::Error& error) {
   if (!end_reason_.empty()) return;
-  end_reason_ = "client too slow: " + error.message;
+  end_soon("client too slow: " + error.message);
   log(LogLevel::warning, "client closed", {{"peer", peer()}, {"reason", end_reason_}});
+}
+
+/// Its own clients hear of an outage by the end of this session. Others keep theirs until the device is back.
+void SharedClient::connection_lost(const rr::Error& error) {
+  if (is_gateway() && end_reason_.empty()) end_soon(error.message);
+}
+
+void SharedClient::end_soon(std::string reason) {
+  end_reason_ = std::move(reason);
   // Not here: whoever sends goes through a list of clients.
   post([this, self = shared_from_this()] {
     session_.close_service(rr::read_clocks());

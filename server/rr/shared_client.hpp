@@ -60,6 +60,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void review();
   /// Tells the client that its service ends, then closes.
   void close_service();
+  /// Whether it is another gateway, which has clients of its own.
+  bool is_gateway() const { return session_.connection().peer().name == gateway_node_name; }
   /// Why the gateway has closed it; empty where it has not.
   const std::string& end_reason() const { return end_reason_; }
 
@@ -123,6 +125,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void release_path(const std::string& path) override;
   void call_callback(const std::string& path, const rr::MemberDefinition& callback,
                      std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) override;
+  void connection_lost(const rr::Error& error) override;
 
   void answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result);
   static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
@@ -136,6 +139,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   rr::Result<> admit_lock(const rr::LockWanted& wanted);
   void begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
   void end_too_slow(const rr::Error& error);
+  void end_soon(std::string reason);
   /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
   std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
 

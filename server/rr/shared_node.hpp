@@ -48,13 +48,13 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
 
   /// The name of the device that a service is of; empty where there is no such service, or the index.
   std::string device_of(std::string_view service) const;
+  std::shared_ptr<SharedService> find_service(std::string_view name) const override;
 
   std::shared_ptr<const rr::Authenticator> authenticator() const override { return logins_.authenticator(); }
   void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
   void withdraw(const rr::HostedService& hosted) override;
 
  private:
-  std::shared_ptr<SharedService> find_service(std::string_view name) const override;
   Logins& logins() override { return logins_; }
   void client_ended(SharedClient& client) override;
 

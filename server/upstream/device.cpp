@@ -159,9 +159,7 @@ rr::Result<std::shared_ptr<Upstream>> Device::find_shared(const std::string& ser
   if (identity_)
     return rr::make_error(rr::ErrorCode::service_not_found,
                           "device " + rr::quote(config_.name) + " has no service " + rr::quote(service));
-  const auto error =
-      rr::make_error(rr::ErrorCode::connection_error, last_error_.empty() ? "it has not answered yet" : last_error_);
-  return rr::make_error(error.code, offline_text(error));
+  return away_error();
 }
 
 std::shared_ptr<ServiceLocks> Device::locks_of(const std::string& service) {
@@ -221,6 +219,12 @@ std::string Device::full_text() const {
 
 std::string Device::offline_text(const rr::Error& error) const {
   return "device " + rr::quote(config_.name) + " is offline: " + error.message;
+}
+
+rr::Error Device::away_error() const {
+  const auto error =
+      rr::make_error(rr::ErrorCode::connection_error, last_error_.empty() ? "it has not answered yet" : last_error_);
+  return rr::make_error(error.code, offline_text(error));
 }
 
 void Device::start() {

@@ -116,6 +116,8 @@ class Device : public std::enable_shared_from_this<Device> {
   // What those hear who can't get to it.
   std::string full_text() const;
   std::string offline_text(const rr::Error& error) const;
+  /// For one that is not online. connection_error.
+  rr::Error away_error() const;
 
   /// For devices by TLS: reads the CAs that it is checked against. See TlsFiles.
   [[nodiscard]] rr::Result<> load_tls();

@@ -251,7 +251,7 @@ void FoundDevices::begin_question(const rr::NodeId& id, std::vector<rr::Connecti
 
 rr::awaitable<void> FoundDevices::ask(rr::NodeId id, std::vector<rr::ConnectionUrl> urls) {
   rr::ServiceQueryOptions options;
-  options.self_name = "rrgate";
+  options.self_name = gateway_node_name;
   options.dial.timeout = config_.timeouts.connect;
   options.dial.send_stall = config_.timeouts.send_stall;
   options.dial.tls = tls_->context();

@@ -9,7 +9,7 @@ namespace rrgate {
 
 rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
   rr::ServiceQueryOptions query;
-  query.self_name = "rrgate";
+  query.self_name = gateway_node_name;
   query.self_id = self_id;
   query.dial = std::move(options);
   query.max_answer_bytes = 12u * 1024 * 1024;  // somebody has named this device: it may have much to say

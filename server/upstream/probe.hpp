@@ -9,6 +9,9 @@
 
 namespace rrgate {
 
+/// The name of the node by which gateways go to devices, and know each other.
+inline constexpr const char* gateway_node_name = "rrgate";
+
 struct DeviceService {
   std::string name;
   std::string type;

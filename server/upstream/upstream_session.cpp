@@ -101,7 +101,7 @@ rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_
   rr::ClientOptions options;
   options.service = service_;
   options.request_timeout = device_->request_timeout();
-  options.connection.self.name = "rrgate";
+  options.connection.self.name = gateway_node_name;
   options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
   if (is_stepwise) options.connection.features.combined_v2 = options.connection.features.combined_v4 = false;
   if (!username.empty()) {

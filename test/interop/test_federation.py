@@ -11,8 +11,10 @@ from directions import LEVELS, PEERS
 from gateways import Gateway, make_web_certificates, rrgate
 import http_api
 from http_api import BASE
+from leases import PLAIN
 from processes import Background, free_port, read_json, start_gateway
 from scenarios import FUNCTIONS, SCENARIO
+from shared_sites import RETRY, Site, port_of
 from tls_nodes import SERVICE, run_steps, start_service
 from users import basic, bearer
 
@@ -222,6 +224,44 @@ def test_the_far_gateway_dies(lab, tmp_path):
     finally:
         client.stop()
         chain.stop()
+
+
+def test_a_device_that_is_lost_behind_the_far_gateway_is_lost_at_the_near_one(node, tmp_path):
+    """Where both share it, too: the near one shows no value of before as one of now, and nothing as online."""
+    far = Site(tmp_path, node)
+    (tmp_path / "near").mkdir()
+    try:
+        near, port = start_gateway(tmp_path / "near", f"rr+tcp://127.0.0.1:{far.port}/?nodename=interop&service=plain",
+                                   device={"mode": "shared"}, retry=RETRY)
+
+        def state():
+            return read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"][0]["state"]
+
+        def next_state():
+            while not isinstance(said := stream.next()[2], dict) or "state" not in said:
+                pass  # values
+            return said["state"]
+
+        def target(at):
+            return http_api.ask(at, "GET", PLAIN + "/seen_target").status
+
+        try:
+            stream = http_api.Stream(port, PLAIN + "/state")
+            assert target(port) == 200
+            far.line.lead_to(free_port())
+            far.line.cut()
+            assert next_state() == "connection_lost"
+            near.wait_until(lambda: state() == "offline")
+            assert target(port) == target(far.port) != 200
+            far.line.lead_to(port_of(far.url))
+            assert next_state() == "connected"
+            near.wait_until(lambda: state() == "online")
+            assert target(port) == 200
+            stream.close()
+        finally:
+            near.stop()
+    finally:
+        far.stop()
 
 
 @pytest.mark.parametrize("count", [1, 2], ids=["itself", "each other"])

@@ -14,8 +14,8 @@ from http_api import ask
 from json_sockets import Socket
 from leases import LEASES, PLAIN, wait_for
 from news import News
-from processes import free_port
-from shared_sites import Site, is_refused, start_arm_v2
+from processes import free_port, start_gateway
+from shared_sites import RETRY, Site, is_refused, port_of, start_arm_v2
 from tap import Held, Tap
 from users import PASSWORDS, basic, make_users
 
@@ -269,6 +269,30 @@ def test_a_device_that_was_away_is_made_safe_when_it_is_back(site):
         wait_for(lambda: is_safe(arm))
         site.gateway.wait_until(lambda: "the device is back, and was made safe" in site.gateway.description())
         assert page.refusal("set", "speed", value=1)[0] in ("ObjectLockedError", "ConnectionError")
+
+
+def test_a_device_that_was_away_behind_another_gateway_is_made_safe_when_it_is_back(node, tmp_path):
+    """The near gateway has the leases; the line that is cut is that from the far one to the device."""
+    far = Site(tmp_path, node)
+    (tmp_path / "near").mkdir()
+    try:
+        near, port = start_gateway(tmp_path / "near", f"rr+tcp://127.0.0.1:{far.port}/?nodename=interop&service=plain",
+                                   device={"mode": "shared", "leases": LEASES}, retry=RETRY)
+        try:
+            arm = far.direct("plain")
+            with Socket(port, PLAIN) as page:
+                drives(page, arm)
+                far.line.lead_to(free_port())
+                far.line.cut()
+                page.next(lease="plain", state="ended")
+                far.line.lead_to(port_of(far.url))
+                near.wait_until(lambda: "the device is back, and was made safe" in near.description())
+                wait_for(lambda: is_safe(arm))
+                assert page.refusal("set", "speed", value=1)[0] == "ObjectLockedError"
+        finally:
+            near.stop()
+    finally:
+        far.stop()
 
 
 def test_safe_values_that_are_lost_with_their_connection_are_sent_again(node, tmp_path):
