@@ -184,7 +184,9 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
            {"member", action.path + "." + action.member},
            {"error", result.error().message}});
       if (by->is_lost()) return self->owe_again(action.path);
-      if (result.error().code == rr::ErrorCode::request_timeout) self->doubts_.push_back({action.path, by->number()});
+      const auto code = result.error().code;  // connection_error: another gateway, before it ends our session, too
+      if (code == rr::ErrorCode::request_timeout || code == rr::ErrorCode::connection_error)
+        self->doubts_.push_back({action.path, by->number()});
     });
   }
   return !by->is_lost();

@@ -68,7 +68,8 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
     std::optional<SafeRequest> last = {};  ///< that was good: for leases of before the object was released
     bool is_checked = false;               ///< looked at, well or not, since a session was opened
   };
-  /// The device did not answer in time, and what its session is worth is not known yet.
+  /// The device did not answer in time, or was lost behind another gateway, and what its session is worth is not known
+  /// yet.
   struct Doubt {
     std::string path;
     std::uint64_t upstream = 0;

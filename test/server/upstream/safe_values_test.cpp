@@ -242,6 +242,21 @@ TEST_CASE("a safe value that a session had not answered when it was lost is sent
   CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
+TEST_CASE("a safe value that was lost behind another gateway is sent by the session after the one that it ends") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  bench.open();
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  leave_unanswered(bench, device, bench.upstream, holder);
+  const auto asked = bench.ask(holder, rr::CallKind::property_get, "bench", "number");
+  std::exchange(device.waiting, std::nullopt)->fail({rr::ErrorCode::connection_error, "connection_lost: device 'arm'"});
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  cut(bench, bench.upstream);
+  bench.open();
+  CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
+}
+
 TEST_CASE("a safe value that a lost session has not answered is sent by one that is open, but into no other lease") {
   Counting device;
   UpstreamBench bench(device.service, leases_with("wait"));
