@@ -111,7 +111,7 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
 std::string node_url(const Request& request) {
   const auto& arrival = request.arrival;
   if (arrival.host.empty()) return {};
-  return (arrival.is_encrypted ? "rrs+ws://" : "rr+ws://") + arrival.host + arrival.prefix +
+  return (arrival.is_encrypted ? "rr+wss://" : "rr+ws://") + arrival.host + arrival.prefix +
          std::string(request.path());
 }
 

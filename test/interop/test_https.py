@@ -49,6 +49,18 @@ def test_clients_by_wss(lab, https, monkeypatch, client, carries):
     check_all(FUNCTIONS.steps, run_steps(client, lab, port, scheme="rr+wss"))
 
 
+def test_the_index_over_https_has_urls_over_https(https, node, tmp_path, monkeypatch):
+    """Of the gateway's own service, by the reference's client."""
+    _, port, ca = https
+    monkeypatch.setenv("SSL_CERT_FILE", str(ca))
+    index = node.ConnectService(f"rr+wss://localhost:{port}/gateway?service=RobotRaconteurServiceIndex")
+    urls = {service.Name: service.ConnectionURL[1] for service in index.GetLocalNodeServices().values()}
+    root = node.ConnectService(urls["gateway"])
+    assert [device.name for device in root.devices] == ["interop"]
+    for each in (root, index):
+        node.DisconnectService(each)
+
+
 @pytest.mark.parametrize("scheme", ["rrs+tcp", "rrs+ws", "rrs+wss"])
 def test_tls_from_end_to_end_through_the_gateway(lab, secure_device, tmp_path, monkeypatch, scheme, carries):
     maker, device_port = secure_device
