@@ -62,7 +62,7 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
       identity->client = client;
       identity->face = face;
-      identity = access_.renew(*identity);
+      identity = co_await renew(std::move(*identity));
       if (!identity) co_return refused("what the ticket was given for was revoked or has expired");
       co_return std::move(*identity);
     }
@@ -70,7 +70,8 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
     if (auto found = access_.sign_ins().find(sign_in_cookie(request), std::chrono::system_clock::now())) {
       found->client = client;
       found->face = face;
-      if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
+      auto renewed = co_await renew(std::move(*found));
+      if (renewed) co_return std::move(*renewed);
     }
   if (connection.identity.proof == Proof::certificate)
     if (auto certified = access_.renew(connection.identity)) {
@@ -79,6 +80,12 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       co_return std::move(*certified);
     }
   co_return access_.anonymous(client, face);
+}
+
+rr::awaitable<std::optional<Identity>> HttpAccess::renew(Identity who) {
+  const auto& jwt = access_.state().jwt;
+  if (who.proof == Proof::oidc && jwt && !jwt->knows(who.credential)) co_await issuer_keys_.look_anew();
+  co_return access_.renew(who);
 }
 
 rr::awaitable<rr::Result<Identity>> HttpAccess::by_authorization(std::string header, ClientOrigin from) {

@@ -74,6 +74,8 @@ class HttpAccess {
   AccessRequests& requests() { return requests_; }
 
  private:
+  /// As Access::renew(). An identity by a key that is not here yet waits for those that the issuer has now.
+  rr::awaitable<std::optional<Identity>> renew(Identity who);
   rr::Result<Identity> by_token(std::string_view token) const;
   rr::awaitable<rr::Result<Identity>> by_password(BasicCredentials credentials, ClientOrigin from);
 

@@ -84,8 +84,9 @@ def test_json_web_tokens(device, tmp_path):
 
 
 @contextlib.contextmanager
-def publishing(folder, device, tls_of=None, **served):
-    """(server, gateway): an issuer's server, and a gateway that takes its keys from there."""
+def publishing(folder, device, tls_of=None, access={}, **served):
+    """(server, gateway): an issuer's server, and a gateway that takes its keys from there; `access` is more of its
+    configuration."""
     make_web_certificates(folder / "id")
     make_web_certificates(folder / "other")
     server = issuers.IssuerServer(folder / "id" / "localhost.pem", folder / "id" / "localhost.key")
@@ -94,7 +95,7 @@ def publishing(folder, device, tls_of=None, **served):
     jwt = {"discover": True, "issuer": server.url, "audience": "rrgate", "ca": [str(folder / (tls_of or "id") / "web-ca.pem")]}
     token = rrgate("token", folder / "tokens", "ci", "--roles", "admin")
     try:
-        with running(folder, device, {"jwt": jwt, "tokens_file": "tokens", "rules": RULES}) as gateway:
+        with running(folder, device, {"jwt": jwt, "tokens_file": "tokens", "rules": RULES, **access}) as gateway:
             gateway.token = token
             yield server, gateway
     finally:
@@ -128,6 +129,31 @@ def test_keys_that_the_issuer_publishes(device, tmp_path):
             assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(forged)).status == 401
         server.stop()
         assert status(second) == 200
+
+
+@pytest.mark.parametrize("shown", ["cookie", "ticket"])
+def test_what_another_gateway_gave_by_a_new_key_waits_for_that_key(device, tmp_path, shown):
+    """The gateways have one ticket key; the one that the token came to has the issuer's new key already."""
+    (tmp_path / "ticket.key").write_text("of this test alone " * 3)
+    (tmp_path / "there").mkdir()
+    shared = {"ticket_key_file": str(tmp_path / "ticket.key")}
+    key_set = issuers.Issuer("", "rrgate").key_set()
+    with publishing(tmp_path, device, access=shared, key_set=key_set) as (server, here):
+        here.wait_for("keys of the issuer fetched")
+        access = {"jwt": here.config["access"]["jwt"], "rules": RULES, **shared}
+        with running(tmp_path / "there", device, access) as there:
+            there.wait_for("keys of the issuer fetched")
+            second = issuers.Issuer(server.url, "rrgate", "-2")
+            server.key_set = second.key_set()
+            proof = bearer(second.token("alice", ["admin"], "ES256"))
+            if shown == "ticket":
+                ticket = ask(here.port, "POST", "/api/v1/tickets", headers=proof).json["ticket"]
+                assert upgrade_status(there.port, f"/devices/interop?ticket={ticket}") == 101
+            else:
+                page = {"Host": "localhost", "Origin": "http://localhost"}
+                made = ask(here.port, "POST", "/api/v1/session", headers={**page, **proof})
+                signed = {**page, "Cookie": cookie_of(made)}
+                assert ask(there.port, "GET", "/api/v1/access", headers=signed).json["user"] == "alice"
 
 
 def test_an_issuer_that_does_not_answer_keeps_nobody_else_waiting(device, tmp_path):
