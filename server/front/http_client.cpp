@@ -107,12 +107,13 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
   return *destination;
 }
 
-/// The URL of the node as the client knows it; empty where it has not told its own.
+/// The URL of the node as the client knows it; empty where it has not told its own. Other nodes are reached at the
+/// root, not at the path that always leads to the gateway's own.
 std::string node_url(const Request& request) {
   const auto& arrival = request.arrival;
   if (arrival.host.empty()) return {};
   return (arrival.is_encrypted ? "rr+wss://" : "rr+ws://") + arrival.host + arrival.prefix +
-         std::string(request.path());
+         std::string(request.path() == gateway_path ? "/" : request.path());
 }
 
 /// 101, then JSON messages.

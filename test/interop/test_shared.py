@@ -70,9 +70,10 @@ def test_many_clients_are_one_to_the_device(node, site):
         node.DisconnectService(root)
 
 
-def test_the_index_tells_of_shared_services(node, site):
+@pytest.mark.parametrize("way", ["rr+tcp://127.0.0.1:{}/?nodename=lab.gateway&", "rr+ws://127.0.0.1:{}/gateway?"])
+def test_the_index_tells_of_shared_services(node, site, way):
     _, port, _ = site
-    index = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=lab.gateway&service=RobotRaconteurServiceIndex")
+    index = node.ConnectService(way.format(port) + "service=RobotRaconteurServiceIndex")
     services = {service.Name: service for service in index.GetLocalNodeServices().values()}
     assert set(services) == {*SERVICES, "gateway"}
     assert services["interop"].RootObjectType == "experimental.interop.Interop"
