@@ -371,7 +371,7 @@ rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient>
   }
   client.login_ = upstream;
   if (client.service_) client.move_to(upstream);
-  upstream->keep_open(service->device()->retry());
+  upstream->keep_open();
   client.session_.answer_login(login.id, rr::AuthenticatedUser{login.attempt.username}, rr::read_clocks());
   client.settle();
 }

@@ -77,7 +77,7 @@ void SharedService::start(std::chrono::milliseconds rests_after) {
   upstream_->on_types_replaced([weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->publish_anew();
   });
-  upstream_->keep_open(device_->retry(), [weak = weak_from_this()] {
+  upstream_->keep_open([weak = weak_from_this()] {
     const auto self = weak.lock();
     return self ? self->publish() : rr::Result<>();
   });

@@ -192,6 +192,10 @@ void Device::become(const DeviceConfig& config, const Config& whole) {
   if (retry_ == whole.retry) return;
   retry_ = whole.retry;
   backoff_ = rr::Backoff(retry_.min, retry_.max);
+  if (waits_for_end_) return;
+  // The wait that is under way is not longer than those that follow.
+  const auto wait = state_ == DeviceState::online ? around(retry_.online) : backoff_.next();
+  wake_.expires_at(std::min(wake_.expiry(), std::chrono::steady_clock::now() + wait));
 }
 
 std::optional<Device::Seat> Device::take_seat() {

@@ -111,7 +111,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Connects, and attaches again what clients had joined. Errors   those of reaching the device and of the login.
   rr::awaitable<rr::Result<>> open();
   /// Opens it, again and again, until close(). `is_used`: says whether a session that was opened is of use.
-  void keep_open(Retry retry, std::function<rr::Result<>()> is_used = nullptr);
+  void keep_open(std::function<rr::Result<>()> is_used = nullptr);
   /// The same, but without clients for this time it rests: the device has no session to keep. Until the first client
   /// comes it is opened to see what there is, and rests at once.
   void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
@@ -308,7 +308,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     for (auto* client : clients)
       if (clients_left_ == left || has(*client)) tell(*client);
   }
-  static rr::awaitable<void> run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used);
+  static rr::awaitable<void> run(std::shared_ptr<Upstream> self, std::function<rr::Result<>()> is_used);
   /// Until it is lost or closed; returns whether it has had no clients for too long instead.
   rr::awaitable<bool> watch_use();
   rr::awaitable<void> rest();

@@ -159,12 +159,13 @@ void Upstream::disconnect_when_safe(const std::shared_ptr<rr::ClientConnection>&
   unanswered_->on_none = [wait] { wait->cancel(); };
 }
 
-void Upstream::keep_open(Retry retry, std::function<rr::Result<>()> is_used) {
-  asio::co_spawn(device_->executor(), run(shared_from_this(), retry, std::move(is_used)), asio::detached);
+void Upstream::keep_open(std::function<rr::Result<>()> is_used) {
+  asio::co_spawn(device_->executor(), run(shared_from_this(), std::move(is_used)), asio::detached);
 }
 
-rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used) {
+rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, std::function<rr::Result<>()> is_used) {
   const std::string device = self->device_->config().name;
+  auto retry = self->device_->retry();
   rr::Backoff backoff(retry.min, retry.max);
   while (!self->is_closed_) {
     rr::Result<> done;
@@ -197,6 +198,10 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
       const auto level = self->use_ == UpstreamUse::all_clients ? LogLevel::warning : LogLevel::debug;
       log(level, "session can't be opened",
           {{"device", device}, {"service", self->service_}, {"error", done.error().message}});
+    }
+    if (retry != self->device_->retry()) {
+      retry = self->device_->retry();
+      backoff = rr::Backoff(retry.min, retry.max);
     }
     self->wake_.expires_after(backoff.next());
     co_await self->wake_.async_wait(wait_token);

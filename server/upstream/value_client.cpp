@@ -390,7 +390,7 @@ rr::Result<std::shared_ptr<Upstream>> ValueClients::find_or_make(const std::shar
     UpstreamLogin login{key.username, {}};
     if (!key.username.empty()) login.credentials.items.emplace_back("password", rr::Value(key.password));
     entry.upstream = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
-    entry.upstream->keep_open(device->retry());
+    entry.upstream->keep_open();
   }
   return entry.upstream;
 }

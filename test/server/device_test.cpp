@@ -107,6 +107,39 @@ TEST_CASE("found devices and pages follow what a reload says of all devices") {
   io.run();
 }
 
+TEST_CASE("a reload with shorter waits ends the wait that is under way") {
+  boost::asio::io_context io{1};
+  rr::Node node(io, "test.device");
+  const auto port = node.listen("rr+tcp://127.0.0.1:0");
+  node.stop();  // nobody answers there yet
+  Config config;
+  config.retry = {std::chrono::hours(1), std::chrono::hours(1), std::chrono::hours(1)};
+  DeviceConfig made;
+  made.name = "x";
+  made.url = rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=x").value();
+  const auto device = std::make_shared<Device>(io.get_executor(), made, config);
+  device->start();
+  const auto run_until = [&](DeviceState state) {
+    const auto end = std::chrono::steady_clock::now() + seconds(10);
+    while (device->state() != state && std::chrono::steady_clock::now() < end) io.run_one_for(milliseconds(50));
+    return device->state() == state;
+  };
+  REQUIRE(run_until(DeviceState::offline));
+  rr::Node again(io, "test.device");
+  again.listen("rr+tcp://127.0.0.1:" + std::to_string(port));
+  const auto change = [&](const Retry& retry) {
+    config.retry = retry;
+    device->become(made, config);
+  };
+  change({milliseconds(10), milliseconds(10), std::chrono::hours(1)});
+  REQUIRE(run_until(DeviceState::online));
+  again.stop();
+  change({milliseconds(10), milliseconds(10), milliseconds(10)});
+  CHECK(run_until(DeviceState::offline));
+  device->stop();
+  io.run_for(seconds(2));
+}
+
 TEST_CASE("of the URLs of a found device the one that answers is taken, whichever hangs") {
   const Hanging hanging;
   rr::RunningNode node([](rr::Node&) {});

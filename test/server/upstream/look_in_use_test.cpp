@@ -97,7 +97,7 @@ struct SmallDevice {
     bench.device->set_urls({turnstile->url()});
     bench.device->start();
     REQUIRE(is(DeviceState::online));
-    bench.upstream->keep_open(bench.config.retry);
+    bench.upstream->keep_open();
     REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
   }
   ~SmallDevice() { turnstile->stop(); }

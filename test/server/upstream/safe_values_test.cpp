@@ -189,7 +189,7 @@ TEST_CASE("a session that rests is ended behind the answer of what makes the dev
   Counting device;
   UpstreamBench bench(device.service);
   bench.upstream->rest_unused(50ms);
-  bench.upstream->keep_open({10s, 10s, 10s});
+  bench.keep_open({10s, 10s, 10s});
   REQUIRE(bench.wait_for(bench.upstream->opened()).has_value());
   bool is_gone = false;
   device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
@@ -309,7 +309,7 @@ TEST_CASE("a session that rests is opened to make the device safe") {
   Counting device;
   UpstreamBench bench(device.service, leases_with_stop());
   bench.upstream->rest_unused(50ms);
-  bench.upstream->keep_open({10ms, 20ms, 10s});
+  bench.keep_open({10ms, 20ms, 10s});
   REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
   const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
   REQUIRE(bench.wait_for(own->open()).has_value());

@@ -76,6 +76,15 @@ class UpstreamBench {
     newer_node->add(service);
     newer_node->listen("rr+tcp://127.0.0.1:" + std::to_string(port));
   }
+  void keep_open(Retry retry, std::function<rr::Result<>()> is_used = nullptr) {
+    set_retry(retry);
+    upstream->keep_open(std::move(is_used));
+  }
+  void set_retry(Retry retry) {
+    config.retry = retry;
+    const auto same = device->config();
+    device->become(same, config);
+  }
   void open() { REQUIRE(wait_for(upstream->open()).has_value()); }
   rr::Result<rr::Value> find(const std::string& path) {
     std::optional<rr::Result<rr::Value>> found;

@@ -112,7 +112,7 @@ TEST_CASE("a device that drops each session at once is tried ever more rarely, u
   UpstreamBench bench(device.service);
   Attempts attempts;
   constexpr std::size_t lasting = 4;
-  bench.upstream->keep_open({40ms, 10s, 10s}, [&]() -> rr::Result<> {
+  bench.keep_open({40ms, 10s, 10s}, [&]() -> rr::Result<> {
     attempts.times.push_back(std::chrono::steady_clock::now());
     if (attempts.times.size() - 1 != lasting) bench.upstream->break_off();
     return {};
@@ -131,6 +131,26 @@ TEST_CASE("a device that drops each session at once is tried ever more rarely, u
   CHECK(attempts.times.back() - lost < 320ms);  // half of what would come next, had it not lasted
 }
 
+TEST_CASE("what a reload says of retries holds from the next wait on") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  int attempts = 0;
+  bench.keep_open({10ms, 20ms, 10s}, [&]() -> rr::Result<> {
+    if (++attempts == 1) bench.set_retry({1h, 1h, 10s});
+    if (attempts == 2) bench.set_retry({10ms, 20ms, 10s});
+    bench.upstream->break_off();
+    return {};
+  });
+  REQUIRE(bench.run_until([&] { return attempts == 1 && !bench.upstream->is_open(); }));
+  boost::asio::steady_timer would_have_retried(bench.io, 100ms);
+  bool is_over = false;
+  would_have_retried.async_wait([&](const auto&) { is_over = true; });
+  REQUIRE(bench.run_until([&] { return is_over; }));
+  CHECK(attempts == 1);
+  bench.upstream->retry_now();
+  CHECK(bench.run_until([&] { return attempts >= 3; }));
+}
+
 TEST_CASE("wires that were joined anew by a session that was lost at once are joined by the next one") {
   const std::string path = "bench.parts[1]";  // which the device is asked for
   Counting device;
@@ -139,7 +159,7 @@ TEST_CASE("wires that were joined anew by a session that was lost at once are jo
   UpstreamBench bench(device.service);
   const auto cut = rr::make_error(rr::ErrorCode::connection_error, "the line was cut");
   int sessions = 0;
-  bench.upstream->keep_open({10ms, 20ms, 10s}, [&]() -> rr::Result<> {
+  bench.keep_open({10ms, 20ms, 10s}, [&]() -> rr::Result<> {
     if (++sessions == 2) bench.upstream->connection()->close(cut);
     return {};
   });
@@ -186,7 +206,7 @@ TEST_CASE("who waits for a session that is lost as soon as it is open hears that
   Counting device;
   UpstreamBench bench(device.service);
   bool is_first = true;
-  bench.upstream->keep_open({10s, 10s, 10s}, [&]() -> rr::Result<> {
+  bench.keep_open({10s, 10s, 10s}, [&]() -> rr::Result<> {
     const auto cut = rr::make_error(rr::ErrorCode::connection_error, "the line was cut");
     if (std::exchange(is_first, false)) bench.upstream->connection()->close(cut);
     return {};
@@ -202,7 +222,7 @@ TEST_CASE("a session that nobody has wanted yet rests once it is known what the 
   Counting device;
   UpstreamBench bench(device.service);
   bench.upstream->rest_unused(1h);
-  bench.upstream->keep_open({10s, 10s, 10s});
+  bench.keep_open({10s, 10s, 10s});
   REQUIRE(bench.run_until([&] { return bench.upstream->is_resting(); }));
   CHECK(bench.upstream->has_tried());
   REQUIRE(bench.upstream->types());
@@ -711,7 +731,7 @@ TEST_CASE("a session that is held does not rest until it is let go") {
   UpstreamBench bench(device.service);
   bench.upstream->hold(true);
   bench.upstream->rest_unused(20ms);
-  bench.upstream->keep_open({10ms, 20ms, 10s});
+  bench.keep_open({10ms, 20ms, 10s});
   REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
   bool has_passed = false;
   boost::asio::steady_timer while_it_is_held(bench.io, 100ms);
