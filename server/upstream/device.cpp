@@ -461,13 +461,16 @@ Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_n
         config_.devices.empty() ? devices_.size() : config_.devices.size();  // configured ones are first
     return choices == 1 ? devices_.front().get() : nullptr;
   }
+  Device* away = nullptr;
   for (const auto& device : devices_) {
     if (device->is_shared()) continue;  // a node of the gateway's own stands for it
     const auto identity = identity_of(*device);
-    if ((node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name))
-      return device.get();
+    const bool is_it =
+        (node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name);
+    if (is_it && device->state() == DeviceState::online) return device.get();
+    if (is_it && !away) away = device.get();
   }
-  return nullptr;
+  return away;
 }
 
 }  // namespace rrgate

@@ -216,7 +216,8 @@ class DeviceRegistry {
   /// The configured device that is this node, as far as is known. Null when there is none.
   Device* find_configured(const rr::NodeId& node_id) const;
   /// The device that a client asks for by node id and name (any id and "" ask for none in particular: it gets the only
-  /// configured device, or where none is configured the only one). Null when there is none.
+  /// configured device, or where none is configured the only one). Of several that are this node, the first that is
+  /// online. Null when there is none.
   Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
 
  private:

@@ -140,6 +140,33 @@ TEST_CASE("a reload with shorter waits ends the wait that is under way") {
   io.run_for(seconds(2));
 }
 
+TEST_CASE("of devices that are one node a client gets one that is online") {
+  boost::asio::io_context io{1};
+  rr::Node node(io, "test.arm");
+  const auto port = node.listen("rr+tcp://127.0.0.1:0");
+  Config config;
+  for (const auto* where : {"1", "live"}) {
+    DeviceConfig made;
+    made.name = where;
+    const auto its_port = made.name == "live" ? std::to_string(port) : made.name;
+    made.url = rr::parse_url("rr+tcp://127.0.0.1:" + its_port + "/?nodename=test.arm&service=x").value();
+    config.devices.push_back(std::move(made));
+  }
+  DeviceRegistry registry(io.get_executor(), config);
+  const auto* away = registry.find("1");
+  const auto* live = registry.find("live");
+  CHECK(registry.route({}, "test.arm") == away);  // neither has answered
+  registry.start();
+  const auto end = std::chrono::steady_clock::now() + seconds(10);
+  while (live->state() != DeviceState::online && std::chrono::steady_clock::now() < end)
+    io.run_one_for(milliseconds(50));
+  CHECK(registry.route({}, "test.arm") == live);
+  CHECK(registry.route(node.identity().id, {}) == live);
+  registry.stop();
+  node.stop();
+  io.run_for(seconds(2));
+}
+
 TEST_CASE("of the URLs of a found device the one that answers is taken, whichever hangs") {
   const Hanging hanging;
   rr::RunningNode node([](rr::Node&) {});
