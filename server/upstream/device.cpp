@@ -74,6 +74,14 @@ std::string_view to_string(DeviceState state) {
   return "unknown";
 }
 
+std::string quotable(std::string_view message) {
+  constexpr std::size_t longest = 400;
+  if (message.size() <= longest) return std::string(message);
+  auto end = longest;
+  while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xc0) == 0x80) --end;  // no half character
+  return std::string(message.substr(0, end)) + "...";
+}
+
 Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
                std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page)
     : config_(std::move(config)),
@@ -222,7 +230,7 @@ std::string Device::full_text() const {
 }
 
 std::string Device::offline_text(const rr::Error& error) const {
-  return "device " + rr::quote(config_.name) + " is offline: " + error.message;
+  return "device " + rr::quote(config_.name) + " is offline: " + quotable(error.message);
 }
 
 rr::Error Device::away_error() const {

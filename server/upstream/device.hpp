@@ -31,6 +31,10 @@ struct LeaseNews;
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
 
+/// As much of what a peer says of an error as is passed on. Two gateways that are each other's device would otherwise
+/// quote each other at ever greater length.
+std::string quotable(std::string_view message);
+
 /// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
 class Device : public std::enable_shared_from_this<Device> {
  public:

@@ -269,16 +269,16 @@ rr::Error Upstream::lost_error() const {
 rr::Error Upstream::lost_error(const std::optional<rr::Error>& reason) const {
   return rr::make_error(rr::ErrorCode::connection_error,
                         "connection_lost: device " + rr::quote(device_->config().name) +
-                            (reason ? ": " + reason->message : std::string(" is not connected")));
+                            (reason ? ": " + quotable(reason->message) : std::string(" is not connected")));
 }
 
 std::optional<rr::Error> Upstream::failure() const {
   if (is_open() || last_attempt_) return std::nullopt;
   const auto& error = last_attempt_.error();
   if (error.code == rr::ErrorCode::service_not_found) return std::nullopt;
-  return rr::make_error(rr::ErrorCode::connection_error, "the gateway has no session with service " +
-                                                             rr::quote(service_) + " of device " +
-                                                             rr::quote(device_->config().name) + ": " + error.message);
+  return rr::make_error(rr::ErrorCode::connection_error,
+                        "the gateway has no session with service " + rr::quote(service_) + " of device " +
+                            rr::quote(device_->config().name) + ": " + quotable(error.message));
 }
 
 bool Upstream::is_lost() const {

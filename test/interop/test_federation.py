@@ -264,6 +264,24 @@ def test_a_device_that_is_lost_behind_the_far_gateway_is_lost_at_the_near_one(no
         far.stop()
 
 
+def test_gateways_that_share_each_other_are_offline(tmp_path):
+    """Neither shows a device that is nowhere, and what they say of each other does not grow."""
+    ports, gateways = [free_port(), free_port()], []
+    try:
+        for port, other in zip(ports, reversed(ports)):
+            (tmp_path / str(port)).mkdir()
+            device = {"name": "arm", "url": f"rr+tcp://127.0.0.1:{other}/?nodename=arm&service=arm", "mode": "shared"}
+            gateways.append(Gateway(tmp_path / str(port), {
+                "listen": [f"127.0.0.1:{port}"], "devices": [device], "retry": RETRY, "timeouts": {"connect_ms": 500}}))
+        for gateway, port in zip(gateways, ports):
+            gateway.wait_for("client connected", 20)
+            (listed,) = read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"]
+            assert listed["state"] == "offline" and len(listed["last_error"]) < 1000, listed
+    finally:
+        for gateway in gateways:
+            gateway.process.stop()
+
+
 @pytest.mark.parametrize("count", [1, 2], ids=["itself", "each other"])
 @pytest.mark.parametrize("scheme", ["rr+tcp", "rr+ws"])
 def test_a_circle(lab, tmp_path, scheme, count):
