@@ -131,8 +131,8 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   }
   devices_.start();
   tell_of_nodes();
-  devices_.on_change([this] { shared_.sync(devices_); });
-  shared_.sync(devices_);
+  devices_.on_change([this] { note_devices(); });
+  note_devices();
   own_service_ = std::make_unique<GatewayService>(io_, *this);
   own_service_->start();
   shared_.add_own(own_service_->device(), std::string(GatewayService::name));
@@ -266,6 +266,9 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (auto replaced = access_.replace(std::move(*access)); !replaced) return fail(replaced.error());
 
   const auto before = std::exchange(config_, std::move(next));
+  if (before.node != config_.node)
+    log(LogLevel::warning, "the gateway's node has its new name and id after a restart",
+        {{"name", shared_.node().identity().name}});
   if (before.access.jwt != config_.access.jwt) issuer_keys_.start();
   if (has_other_tls) web_tls_ = std::move(web_tls);
   std::erase_if(listeners_, [&](const Listener& listener) {
@@ -279,7 +282,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
   admission_.set_limits(config_.limits.clients, config_.limits.clients_per_address);
   memory_.set_total(memory_total(config_));
   devices_.replace(std::move(*devices));
-  shared_.sync(devices_);
+  note_devices();
   shared_.renew_judges();
   if (found_) {
     found_->note_change(before.discover, std::move(found_tls));
@@ -303,6 +306,11 @@ rr::Result<> Gateway::reconfigure(Config next) {
   clients_.close_all_but(is_still_there);
   end_those_not_good();
   return {};
+}
+
+void Gateway::note_devices() {
+  shared_.sync(devices_);
+  if (own_service_) own_service_->look_at_devices();
 }
 
 void Gateway::end_those_not_good() {

@@ -66,6 +66,8 @@ class Gateway : public GatewayState {
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_files();
   void watch_clock();
+  /// Devices have joined or gone.
+  void note_devices();
   /// Ends what goes on for clients whose proof was revoked or has expired.
   void end_those_not_good();
   void give_adopted_back();

@@ -29,10 +29,12 @@ class GatewayService {
   const std::shared_ptr<Device>& device() const { return device_; }
   void start();
   void stop();
+  /// Tells its clients what has become of the devices. Called when some have joined or gone, too: leases are told of
+  /// from then on.
+  void look_at_devices();
 
  private:
   void add_members();
-  void look_at_devices();
   rr::Value describe(const Device& device) const;
   rr::Value list_devices() const;
   rr::Value list_statistics() const;

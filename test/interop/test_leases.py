@@ -2,6 +2,7 @@
 native clients are those of the real package; what the device was told is asked of it by a client that comes by no gateway."""
 import contextlib
 import json
+import signal
 import subprocess
 import sys
 import threading
@@ -293,6 +294,19 @@ def test_a_device_that_was_away_behind_another_gateway_is_made_safe_when_it_is_b
             near.stop()
     finally:
         far.stop()
+
+
+def test_leases_of_a_device_that_a_reload_brings_are_told_from_the_first_on(site, gateway):
+    news = News()
+    gateway.lease_changed += lambda lease: news.add((lease.device, lease.held))
+    file = site.folder / "gateway.json"
+    config = json.loads(file.read_text())
+    config["devices"].append({**config["devices"][0], "name": "another"})
+    file.write_text(json.dumps(config))
+    site.gateway.process.send_signal(signal.SIGHUP)
+    another = PLAIN.replace("interop", "another") + "?lease=acquire&deadman=60000"
+    wait_for(lambda: ask(site.port, "POST", another).status == 200)
+    news.wait_for(lambda lease: lease == ("another", 1))
 
 
 def test_safe_values_that_are_lost_with_their_connection_are_sent_again(node, tmp_path):

@@ -142,6 +142,16 @@ def test_a_changed_configuration(device, tmp_path, way):
         stays.close()
 
 
+def test_another_name_of_the_node_needs_a_restart_and_that_is_told(device, tmp_path):
+    with running(tmp_path, {"devices": [interop(device)], "node": {"name": "before"}}) as gateway:
+        gateway.hang_up()
+        gateway.wait_for("configuration read anew")
+        assert not gateway.events("the gateway's node has its new name and id after a restart")
+        gateway.write({**gateway.config, "node": {"name": "after"}})
+        gateway.hang_up()
+        assert gateway.wait_for("the gateway's node has its new name and id after a restart")["name"] == "before"
+
+
 def test_streams_of_a_device_that_is_another_one_now_end(device, tmp_path):
     with running(tmp_path, {"devices": [interop(device)]}) as gateway:
         stream = Stream(gateway.port, BASE + "/state")
