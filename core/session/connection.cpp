@@ -312,10 +312,18 @@ Result<> Connection::send(Message& message, Now now, bool is_urgent) {
   return note_sent(now);
 }
 
-Result<> Connection::send(SharedMessage& message, Now now, bool is_urgent) {
+Result<> Connection::send(SharedMessage& message, Now now, bool is_urgent, LentMessage* lent) {
   if (state_ == ConnectionState::closed) return close_reason_;
   address(message.message.header);
   complete_header(message.message);
+  if (lent && queue_.size() == 0) {
+    const auto encoded = message.lend(encode_options());
+    if (!encoded) return encoded.error();
+    if (*encoded) {
+      *lent = {&message, (*encoded)->slices(), (*encoded)->size()};
+      return note_sent(now);
+    }
+  }
   if (auto queued = queue_.push(message, encode_options(), is_urgent); !queued) return queued;
   return note_sent(now);
 }
@@ -360,6 +368,16 @@ void Connection::handle_transmitted(std::size_t bytes, Now now) {
   // The heartbeat is on its way as long as the stream takes what lies before it; the peer's time begins behind that.
   ahead_of_heartbeat_ -= std::min(bytes, ahead_of_heartbeat_);
   heartbeat_sent_ = now.steady;
+}
+
+bool Connection::handle_lent(const LentMessage& lent, std::size_t bytes, Now now) {
+  if (bytes == lent.size) {
+    stats_.bytes_sent += bytes;
+    return true;
+  }
+  (void)queue_.push(*lent.message, encode_options());  // encoded already: nothing can fail
+  handle_transmitted(bytes, now);
+  return false;
 }
 
 // --- time ---

@@ -56,6 +56,13 @@ struct ConnectionStats {
   std::uint64_t bytes_sent = 0;
 };
 
+/// What was sent without being copied: the bytes are those that the next receiver is sent, too.
+struct LentMessage {
+  SharedMessage* message = nullptr;  ///< null: nothing was lent
+  std::span<const ByteSpan> slices = {};
+  std::size_t size = 0;  ///< of the slices together
+};
+
 /// The stream layer of a connection, for both roles. Its owner feeds bytes with receive(), looks at message() after
 /// each call, and sends with send().
 class Connection {
@@ -79,6 +86,8 @@ class Connection {
   void excuse_silence(Now now);
   /// The bytes of poll_transmit() that were written.
   void handle_transmitted(std::size_t bytes, Now now);
+  /// Of what the last send() has lent `bytes` were written; the rest is queued. Returns whether there is none.
+  bool handle_lent(const LentMessage& lent, std::size_t bytes, Now now);
 
   // --- asked ---
 
@@ -86,8 +95,9 @@ class Connection {
   /// (begin_message() sets them). Entry types below 500 keep full routing. What was sent is empty afterwards.
   /// Errors   connection_error when closed or the queue is full; protocol_error above the size limit.
   Result<> send(Message& message, Now now, bool is_urgent = false);
-  /// Sends what other peers are sent as well, addressed to this one's session. Errors   those of send().
-  Result<> send(SharedMessage& message, Now now, bool is_urgent = false);
+  /// Sends what other peers are sent as well, addressed to this one's session. `lent`: where nothing waits for the
+  /// stream the message is not queued, but is to be written from there, at once. Errors   those of send().
+  Result<> send(SharedMessage& message, Now now, bool is_urgent = false, LentMessage* lent = nullptr);
   /// Clears `message` and addresses it to the peer's session: endpoints and the next message id.
   void begin_message(Message& message);
   /// The size limit rises from max_unauthorised_message_size to max_message_size.

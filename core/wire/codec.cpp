@@ -52,14 +52,19 @@ void EncodedMessage::assign(const EncodedMessage& other, std::uint16_t message_i
   slices_ = other.slices_;
   owners_ = other.owners_;
   message_id_at_ = other.message_id_at_;
-  std::memcpy(scratch_.data() + message_id_at_, &message_id, sizeof(message_id));
-  if (!marked.empty()) std::memcpy(scratch_.data() + other.marked_at_, marked.data(), marked.size());
+  marked_at_ = other.marked_at_;
+  address(message_id, marked);
   std::size_t at = 0;
   for (auto& slice : slices_) {
     if (slice.data() != other.scratch_.data() + at) continue;  // a payload
     slice = {scratch_.data() + at, slice.size()};
     at += slice.size();
   }
+}
+
+void EncodedMessage::address(std::uint16_t message_id, ByteSpan marked) {
+  std::memcpy(scratch_.data() + message_id_at_, &message_id, sizeof(message_id));
+  if (!marked.empty()) std::memcpy(scratch_.data() + marked_at_, marked.data(), marked.size());
 }
 
 void EncodedMessage::clear() {

@@ -72,6 +72,8 @@ class EncodedMessage {
   /// Becomes a copy of a version-4 message that has a MessageID, with another one, and with other bytes of the marked
   /// element. Referenced payloads are shared.
   void assign(const EncodedMessage& other, std::uint16_t message_id, ByteSpan marked = {});
+  /// The same in place, for the next receiver.
+  void address(std::uint16_t message_id, ByteSpan marked);
   void clear();
 
  private:

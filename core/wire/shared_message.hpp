@@ -29,10 +29,14 @@ class SharedMessage {
   }
   /// The same as encode() of `message`. Its entries and metadata stay as they are from the first call on.
   [[nodiscard]] Result<> encode(const EncodeOptions& options, EncodedMessage& out);
+  /// The same without a copy: valid until the next of these calls. Null where the receiver needs one of its own.
+  [[nodiscard]] Result<const EncodedMessage*> lend(const EncodeOptions& options);
   /// `message` may be changed again.
   void forget_encoded() { encoded_ = {}; }
 
  private:
+  Result<EncodedMessage*> common(const EncodeOptions& options);
+
   std::array<EncodedMessage, 4> encoded_;  ///< by string table mode; empty while nobody needs it
 };
 

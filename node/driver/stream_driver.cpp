@@ -125,6 +125,14 @@ void StreamDriver::write(Now now) {
   }
 }
 
+std::size_t StreamDriver::write_at_once(std::span<const ByteSpan> slices, Now now) {
+  if (is_closed_) return 0;
+  error_code error;
+  const std::size_t bytes = stream_->try_write(slices, error);
+  if (error) finish(stream_error(error), now);
+  return bytes;
+}
+
 awaitable<void> StreamDriver::write_waiting(std::shared_ptr<StreamDriver> self) {
   auto& driver = *self;
   if (driver.is_closed_) co_return;

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/session/connection.hpp"
 #include "core/session/transmit_queue.hpp"
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
@@ -44,6 +45,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
  protected:
   /// settle() at a time that was read just now.
   void settle(Now now);
+  /// Writes what goes without waiting, past the session's queue. Returns bytes; what fails closes the stream.
+  std::size_t write_at_once(std::span<const ByteSpan> slices, Now now);
   /// Runs `work` on the thread of the stream, later.
   void post(std::function<void()> work);
 
@@ -79,16 +82,17 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   /// At most at once: the session hears how it goes on.
   static constexpr std::size_t write_size = TransmitQueue::write_size;
 
+  // First what each write looks at, together.
   std::unique_ptr<ByteStream> stream_;
-  boost::asio::steady_timer timer_;
-  TimePoint armed_for_ = TimePoint::max();
-  ReadBuffer buffer_;
-  ByteSpan unread_;          ///< of buffer_: the session does not take it yet, and nothing more is read
   bool is_reading_ = false;  ///< read_all() runs
   bool is_settling_ = false;
   bool is_writing_ = false;  ///< write_waiting() runs
   bool is_closed_ = false;
   bool ends_in_good_order_ = false;  ///< the session has said goodbye: the stream may as well
+  ByteSpan unread_;                  ///< of buffer_: the session does not take it yet, and nothing more is read
+  TimePoint armed_for_ = TimePoint::max();
+  boost::asio::steady_timer timer_;
+  ReadBuffer buffer_;
 };
 
 /// The driver of one ClientSession or ServiceSession. What it leaves to the derived class are the session's events.
@@ -98,6 +102,17 @@ class SessionDriver : public StreamDriver {
   template <class... Args>
   explicit SessionDriver(std::unique_ptr<ByteStream> stream, Args&&... session_arguments)
       : StreamDriver(std::move(stream)), session_(std::forward<Args>(session_arguments)...) {}
+
+  /// settle() after something was sent that the session may have lent. What is lent and goes at once leaves nothing to
+  /// settle: no event, nothing in the queue, and no deadline that comes earlier.
+  void settle(const LentMessage& lent, Now now) {
+    if (lent.message) {
+      const auto bytes = write_at_once(lent.slices, now);
+      if (is_closed() || session_.handle_lent(lent, bytes, now)) return;
+    }
+    StreamDriver::settle(now);
+  }
+  using StreamDriver::settle;
 
   Session session_;
 

@@ -150,8 +150,9 @@ void SharedClient::handle(const rr::WireReceived& received) {
 
 void SharedClient::receive_wire(rr::WirePacket& packet) {
   const auto now = rr::read_clocks();
-  (void)session_.send_wire(packet, now);  // a lost connection is heard of by itself
-  settle(now);
+  rr::LentMessage lent;
+  (void)session_.send_wire(packet, now, &lent);  // a lost connection is heard of by itself
+  settle(lent, now);
 }
 
 void SharedClient::answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) {
@@ -200,9 +201,11 @@ void SharedClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
 }
 
 void SharedClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
-  const auto sent = session_.send_pipe_packet(id, packet, rr::read_clocks());
+  const auto now = rr::read_clocks();
+  rr::LentMessage lent;
+  const auto sent = session_.send_pipe_packet(id, packet, now, &lent);
   if (!sent && sent.error().code == rr::ErrorCode::out_of_system_resource) return end_too_slow(sent.error());
-  settle();
+  settle(lent, now);
   if (is_behind_ || is_closed() || session_.queued_bytes() <= much_waiting()) return;
   is_behind_ = true;
   if (std::exchange(was_behind_, true)) return;
@@ -267,8 +270,9 @@ void SharedClient::end_soon(std::string reason) {
 
 void SharedClient::receive_event(rr::EventPacket& packet) {
   const auto now = rr::read_clocks();
-  (void)session_.send_event(packet, now);  // a lost connection is heard of by itself
-  settle(now);
+  rr::LentMessage lent;
+  (void)session_.send_event(packet, now, &lent);  // a lost connection is heard of by itself
+  settle(lent, now);
 }
 
 void SharedClient::release_path(const std::string& path) {

@@ -92,12 +92,13 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& v
   });
 }
 
-Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now) {
+Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now,
+                                                       LentMessage* lent) {
   return send_numbered(id, now, [&](const ServicePipe& pipe, std::uint32_t number) -> Result<> {
     const auto message =
         packet.message(pipe.key->path, pipe.state.member(), pipe.is_unreliable, pipe.index, number, service_->types());
     if (!message) return message.error();
-    return connection_.send(**message, now);
+    return connection_.send(**message, now, false, lent);
   });
 }
 

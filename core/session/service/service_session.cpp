@@ -192,12 +192,12 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
   return send_event(packet, now);
 }
 
-Result<> ServiceSession::send_event(EventPacket& packet, Now now) {
+Result<> ServiceSession::send_event(EventPacket& packet, Now now, LentMessage* lent) {
   if (!service_) return make_error(ErrorCode::connection_error, "no client is connected");
   if (!may_use_service() || !admit(EntryType::event_req, packet.path(), &packet.member())) return {};
   const auto message = packet.message(service_->types());
   if (!message) return message.error();
-  auto sent = connection_.send(**message, now, packet.member().has_modifier("urgent"));
+  auto sent = connection_.send(**message, now, packet.member().has_modifier("urgent"), lent);
   if (!sent && connection_.state() == ConnectionState::closed) leave(sent.error(), now);
   return sent;
 }

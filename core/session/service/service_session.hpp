@@ -97,6 +97,9 @@ class ServiceSession {
   ///          answered or bytes sent.
   std::size_t handle_bytes(ByteSpan input, Now now);
   void handle_transmitted(std::size_t bytes, Now now);
+  bool handle_lent(const LentMessage& lent, std::size_t bytes, Now now) {
+    return connection_.handle_lent(lent, bytes, now);
+  }
   void handle_timeout(Now now);
   void handle_closed(Error reason, Now now);
   /// Another session of the service had the event LocksChanged.
@@ -112,12 +115,12 @@ class ServiceSession {
   /// Clients that still have to log in are sent nothing.
   /// Errors   those of packing; connection_error.
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
-  /// The same for an event that others are sent as well.
-  Result<> send_event(EventPacket& packet, Now now);
+  /// The same for an event that others are sent as well. `lent`: see Connection::send().
+  Result<> send_event(EventPacket& packet, Now now, LentMessage* lent = nullptr);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
   /// The same for a value that others are sent as well, with its own time.
-  Result<> send_wire(WirePacket& packet, Now now);
+  Result<> send_wire(WirePacket& packet, Now now, LentMessage* lent = nullptr);
   /// Values of a wire were replaced before they came here: for its ledger.
   void note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count);
   /// Answers WireConnected of a remote service, where it is not answered yet.
@@ -133,7 +136,7 @@ class ServiceSession {
   ///          queued_bytes()), nothing was sent; those of pack().
   Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
   /// The same for a packet that others are sent as well.
-  Result<std::uint32_t> send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now);
+  Result<std::uint32_t> send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now, LentMessage* lent = nullptr);
   /// Answers PipeReceived of a remote service. Unknown ids (the endpoint is closed) are ignored.
   void acknowledge_pipe(PipeId id, std::span<const std::uint32_t> numbers, Now now);
   /// Closes the endpoint and tells the client; no event follows.
@@ -409,7 +412,7 @@ class ServiceSession {
   /// What the application says, whose parameter may be of the service's types.
   void write_own_error(const Error& error);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  Result<> send_wire_packet(WireConnection& wire, WirePacket& packet, Now now);
+  Result<> send_wire_packet(WireConnection& wire, WirePacket& packet, Now now, LentMessage* lent);
   void flush_wires(Now now);
 
   ServiceDirectory& directory_;

@@ -14,26 +14,28 @@ Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition
   return send_wire(packet, now);
 }
 
-Result<> ServiceSession::send_wire(WirePacket& packet, Now now) {
+Result<> ServiceSession::send_wire(WirePacket& packet, Now now, LentMessage* lent) {
   const auto found = wires_.find(PathMemberView{packet.path(), packet.member().name});
   if (!may_use_service() || found == wires_.end()) return {};
   auto& wire = found->second;
   if (wire.waiting) ++wire.ledger.conflated;
   wire.waiting.reset();
   if (wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark)
-    return send_wire_packet(wire, packet, now);
+    return send_wire_packet(wire, packet, now, lent);
   wire.waiting = WireValue{packet.time(), packet.value()};
   wire.waiting_since = packet.arrived();
   return {};
 }
 
-Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& packet, Now now) {
+Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& packet, Now now, LentMessage* lent) {
   std::optional<WirePacket> own;  // where this client needs another stamp
-  if (const auto time = wire.stamp(packet.time()); time != packet.time())
+  if (const auto time = wire.stamp(packet.time()); time != packet.time()) {
     own.emplace(packet.path(), packet.member(), packet.value(), time, packet.arrived());
+    lent = nullptr;
+  }
   const auto message = (own ? *own : packet).message(service_->types());
   if (!message) return message.error();
-  auto sent = connection_.send(**message, now);
+  auto sent = connection_.send(**message, now, false, lent);
   if (sent)
     wire.ledger.note_delivery(now.steady - packet.arrived());
   else if (connection_.state() == ConnectionState::closed)
@@ -53,7 +55,7 @@ void ServiceSession::flush_wires(Now now) {
     const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
     WirePacket packet(key.path, *wire.member, value, time, wire.waiting_since);
     // What can fail is a value that does not fit, which others don't wait for, or the session, with all its wires.
-    (void)send_wire_packet(wire, packet, now);
+    (void)send_wire_packet(wire, packet, now, nullptr);
     if (!service_ || connection_.queued_bytes() >= wire_high_mark) return;
   }
 }

@@ -152,6 +152,46 @@ TEST_CASE("one packet of a wire serves all its clients, each as it speaks") {
   }
 }
 
+TEST_CASE("what a stream does not take of a value that was lent is kept for it, ahead of what is sent next") {
+  std::vector<std::unique_ptr<Loopback>> pairs;
+  for (int i = 0; i < 3; ++i) {
+    auto& pair = *pairs.emplace_back(std::make_unique<Loopback>());
+    pair.connect();
+    pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+    pair.next_service<WireConnected>();
+  }
+  const auto& state = *pairs.front()->service->service()->root_type().find_member("state");
+  const auto send = [&](const Value& value, std::int64_t time, std::size_t share) {
+    WirePacket packet("arm", state, value, {time, 0}, pairs.front()->now.steady);
+    for (const auto& pair : pairs) {
+      const bool is_queued = pair->service->queued_bytes() > 0;
+      LentMessage lent;
+      REQUIRE(pair->service->send_wire(packet, pair->now, &lent));
+      REQUIRE((lent.message == nullptr) == is_queued);
+      if (is_queued) continue;
+      Bytes bytes;
+      for (const auto slice : lent.slices) bytes.insert(bytes.end(), slice.begin(), slice.end());
+      CHECK(bytes.size() == lent.size);
+      const auto written = ByteSpan(bytes).first(lent.size * share / 4);
+      CHECK(pair->client->handle_bytes(written, pair->now) == written.size());
+      CHECK(pair->service->handle_lent(lent, written.size(), pair->now) == (share == 4));
+      CHECK((pair->service->queued_bytes() == 0) == (share == 4));
+    }
+  };
+  const auto share = GENERATE(std::size_t{0}, std::size_t{1}, std::size_t{3}, std::size_t{4});
+  const auto sent_before = pairs.front()->service->connection().stats().bytes_sent;
+  send(pose(1), 50, share);
+  send(pose(2), 51, 4);
+  for (const auto& pair : pairs) pair->pump();
+  for (const auto& pair : pairs) {
+    for (std::int32_t i = 1; i <= 2; ++i) CHECK(pair->next_client<WireValueReceived>().value == pose(i));
+    CHECK_FALSE(pair->client->poll_event());
+    CHECK(pair->service->total_ledgers().wires.delivered == 2);
+    CHECK(pair->service->connection().stats().bytes_sent > sent_before);
+    CHECK(pair->service->connection().stats().bytes_sent == pair->client->connection().stats().bytes_received);
+  }
+}
+
 TEST_CASE("a value that does not fit its wire goes to nobody") {
   Loopback pair;
   pair.connect();

@@ -54,6 +54,9 @@ TEST_CASE("every receiver of a shared message gets the bytes that it would get a
     address(shared.message.header, message_id, has_addresses, version);
     expected.push_back(alone(shared.message, options));
     REQUIRE(shared.encode(options, sent.emplace_back()));
+    const auto* lent = shared.lend(options).value();
+    CHECK((lent != nullptr) == (version == 4 && !has_addresses && message_id != 0));
+    if (lent) CHECK(to_hex(lent->to_bytes()) == expected.back());
   };
   for (const auto mode : modes)
     for (const std::uint16_t message_id : std::initializer_list<std::uint16_t>{1, 0, 65535, 258, 3})
@@ -82,6 +85,7 @@ TEST_CASE("every receiver of a shared message gets its own number") {
     address(shared.message.header, static_cast<std::uint16_t>(number % 7), false);
     REQUIRE(shared.encode({}, sent));
     CHECK(to_hex(sent.to_bytes()) == alone(shared.message, {}));
+    if (const auto* lent = shared.lend({}).value()) CHECK(to_hex(lent->to_bytes()) == alone(shared.message, {}));
   }
 }
 
