@@ -1,6 +1,7 @@
 // What sockets and character devices have in common as streams. Layer: node/transport.
 #pragma once
 
+#include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/container/static_vector.hpp>
@@ -94,12 +95,19 @@ class DescriptorStream : public ByteStream {
   /// `offset`  bytes of the first slice that are written already.
   std::size_t write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error) {
     boost::container::static_vector<boost::asio::const_buffer, 64> buffers;
+    std::size_t size = 0;
     for (const auto& slice : slices) {
       if (buffers.size() == buffers.capacity()) break;
       const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
       buffers.emplace_back(rest.data(), rest.size());
+      size += rest.size();
     }
-    // One slice alone goes by send(), which costs less than sendmsg().
+    // One slice alone goes by send(), which costs less than sendmsg(), and less even with a copy of few bytes.
+    std::array<std::uint8_t, 1024> small;
+    if (buffers.size() > 1 && size <= small.size()) {
+      boost::asio::buffer_copy(boost::asio::buffer(small), buffers);
+      buffers.assign(1, boost::asio::buffer(small.data(), size));
+    }
     const auto written = buffers.size() == 1 ? descriptor_.write_some(boost::asio::buffer(buffers.front()), error)
                                              : descriptor_.write_some(buffers, error);
     if (error == boost::asio::error::would_block) error = {};

@@ -20,10 +20,10 @@ constexpr std::chrono::milliseconds stream_close_time{1000};
 WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRole role, bool takes_close)
     : inner_(std::move(inner)),
       role_(role),
-      decoder_(role),
-      splitter_(role),
-      close_limit_(inner_->executor(), [this] { inner_->close(); }),
       takes_close_(takes_close),
+      splitter_(role),
+      decoder_(role),
+      close_limit_(inner_->executor(), [this] { inner_->close(); }),
       written_(inner_->executor(), asio::steady_timer::time_point::max()) {}
 
 awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
@@ -61,7 +61,7 @@ std::size_t WebSocketStream::try_write(std::span<const ByteSpan> slices, error_c
   if (frames.empty()) return 0;
   const auto payload = splitter_.consume(inner_->try_write(frames, error));
   is_broken_ = static_cast<bool>(error);
-  written_.cancel();
+  if (controls_ > 0) written_.cancel();  // nobody else can wait: there is one writer
   return payload;
 }
 

@@ -37,18 +37,19 @@ class WebSocketStream final : public ByteStream {
   awaitable<error_code> write_control(Bytes frame);
   awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
 
+  // First what each write looks at, together.
   std::unique_ptr<ByteStream> inner_;
   WebSocketRole role_;
-  WebSocketDecoder decoder_;
-  FrameSplitter splitter_;
-  Deadline close_limit_;
   bool takes_close_;
+  bool is_writing_ = false;
+  bool is_broken_ = false;    ///< closed, or a write ended within a frame: nothing more can be sent
+  std::size_t controls_ = 0;  ///< control frames that wait, or are written: they come before the next frame of data
+  FrameSplitter splitter_;
+  WebSocketDecoder decoder_;
+  Deadline close_limit_;
   std::size_t cancels_ = 0;             ///< a read of several steps looks at it between them
   std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
-  bool is_writing_ = false;
-  std::size_t controls_ = 0;  ///< control frames that wait, or are written: they come before the next frame of data
-  bool is_broken_ = false;    ///< closed, or a write ended within a frame: nothing more can be sent
-  boost::asio::steady_timer written_;  ///< cancelled when a write ends, and when the stream is closed
+  boost::asio::steady_timer written_;   ///< cancelled when a write ends, and when the stream is closed
 };
 
 }  // namespace rr

@@ -224,7 +224,7 @@ std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload
   std::size_t left = 0;
   for (const auto& slice : payload) left += slice.size();
   left = std::min(left, limit);
-  const std::size_t most_frames = left / max_frame_payload + 2;
+  const std::size_t most_frames = left / max_frame_payload + (open_ ? 2 : 1);
   frames_.clear();
   frames_.reserve(most_frames);  // slices_ points into it
   slices_.clear();

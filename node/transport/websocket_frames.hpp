@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <boost/container/small_vector.hpp>
 #include <boost/system/error_code.hpp>
 #include <cstdint>
 #include <optional>
@@ -132,8 +133,8 @@ class FrameSplitter {
 
   WebSocketRole role_;
   std::optional<Frame> open_;
-  std::vector<Frame> frames_;
-  std::vector<ByteSpan> slices_;
+  boost::container::small_vector<Frame, 1> frames_;
+  boost::container::small_vector<ByteSpan, 2> slices_;
   Bytes masked_;  ///< frames of a client
 };
 
