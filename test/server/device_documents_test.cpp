@@ -4,6 +4,8 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
+#include "server/json/json.hpp"
+
 using namespace rrgate;
 using Catch::Matchers::Contains;
 
@@ -53,4 +55,32 @@ TEST_CASE("types of services that fit beside each other are told, and why there 
   CHECK(refused.status == 503);
   REQUIRE(refused.body);
   CHECK_THAT(*refused.body, Contains("do not fit together") && Contains("Shade"));
+}
+
+TEST_CASE("documents of many paths through few objects are bounded, and say so") {
+  std::string text = "service test.tree\nstdver 0.10\nobject o0\n    property double speed\nend\n";
+  const auto add_object = [&text](int number) {
+    const auto below = std::to_string(number - 1);
+    text += "object o" + std::to_string(number) + "\n    event done()\n    objref o" + below + " a\n    objref o" +
+            below + " b\nend\n";
+  };
+  for (int number = 1; number <= 20; ++number) add_object(number);
+  const auto types = registry({text});
+  const auto paths = [&types](const std::string& root) {
+    const auto response = device_document("openapi.json", "d", "/d", {{"tree", root, types.get()}}, {});
+    REQUIRE(response.body);
+    const auto document = rr::OrderedJson::parse(*response.body);
+    return std::pair(document["paths"].size(), document.contains("x-rr-truncated"));
+  };
+  CHECK(paths("test.tree.o3") == std::pair<std::size_t, bool>(15, false));
+  const auto [count, is_truncated] = paths("test.tree.o20");
+  CHECK(count > 1000);
+  CHECK(count < 5000);
+  CHECK(is_truncated);
+  for (const std::string document : {"asyncapi.json", "thing-description.json"}) {
+    const auto response = device_document(document, "d", "/d", {{"tree", "test.tree.o20", types.get()}}, {});
+    REQUIRE(response.body);
+    CHECK(response.body->size() < 8'000'000);
+    CHECK_THAT(*response.body, Contains("\"x-rr-truncated\":true"));
+  }
 }

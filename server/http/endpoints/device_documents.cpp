@@ -46,13 +46,14 @@ Response device_document(std::string_view document, std::string_view device, con
   OrderedJson out;
   std::string_view type = "application/json";
   if (document == "openapi.json") {
-    out = open_api(device, places, std::move(schemas), unavailable);
+    out = open_api(device, places.members, std::move(schemas), unavailable);
   } else if (document == "asyncapi.json") {
-    out = async_api(device, base, services, places, std::move(schemas));
+    out = async_api(device, base, services, places.members, std::move(schemas));
   } else {
-    out = thing_description(device, places, std::move(schemas));
+    out = thing_description(device, places.members, std::move(schemas));
     type = "application/td+json";
   }
+  if (places.is_truncated) out["x-rr-truncated"] = true;
   return text_response(200, type, rr::write_json(out) + "\n");
 }
 

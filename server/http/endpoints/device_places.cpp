@@ -12,24 +12,46 @@ using rr::OrderedJson;
 
 namespace {
 
+/// Of a document, about: some 3,000 members. It is made on the gateway's thread, and kept.
+constexpr std::size_t most_bytes = 1 << 20;
+/// What a member takes there by itself, and each of its parameters.
+constexpr std::size_t about_bytes_a_part = 256;
+
 bool has_index(const rr::MemberDefinition& objref) {
   return objref.type.array != rr::ArrayKind::none || objref.type.container != rr::ContainerKind::none;
 }
 
-void add_places(const DescribedService& service, const rr::EntityDefinition& type, const DocumentedMember& object,
-                std::vector<std::string> chain, std::vector<DocumentedMember>& out) {
-  chain.push_back(type.qualified_name);
-  for (const auto& member : type.members) {
-    DocumentedMember place = object;
-    place.member = &member;
-    place.path += "/" + member.name;
-    place.id += "_" + member.name;
-    if (member.kind != rr::MemberKind::objref) {
-      out.push_back(std::move(place));
-      continue;
+/// Many objrefs to few types make many paths.
+class PlaceWalk {
+ public:
+  void add_service(const std::string& base, const DescribedService& service) {
+    const auto* root = service.types->find_entity(service.root_type);
+    if (!root) return;
+    add_members(*root,
+                {&service, nullptr, base + "/" + rr::percent_encode(service.name), service.name, {}, service.name});
+  }
+  Places take() { return std::move(out_); }
+
+ private:
+  void add_members(const rr::EntityDefinition& type, const DocumentedMember& object) {
+    chain_.push_back(&type);
+    for (const auto& member : type.members) {
+      DocumentedMember place = object;
+      place.member = &member;
+      place.path += "/" + member.name;
+      place.id += "_" + member.name;
+      if (!spend(place)) break;
+      if (member.kind == rr::MemberKind::objref)
+        add_object(member, std::move(place));
+      else
+        out_.members.push_back(std::move(place));
     }
-    const auto* target = service.types->find_entity(member.type.qualified_name);
-    if (!target || std::find(chain.begin(), chain.end(), target->qualified_name) != chain.end()) continue;
+    chain_.pop_back();
+  }
+
+  void add_object(const rr::MemberDefinition& member, DocumentedMember place) {
+    const auto* target = place.service->types->find_entity(member.type.qualified_name);
+    if (!target || std::find(chain_.begin(), chain_.end(), target) != chain_.end()) return;
     place.object_path += "." + member.name;
     if (has_index(member)) {
       auto name = member.name;
@@ -38,22 +60,30 @@ void add_places(const DescribedService& service, const rr::EntityDefinition& typ
       place.object_path += "[{" + name + "}]";
       place.indices.push_back(name);
     }
-    add_places(service, *target, place, chain, out);
+    add_members(*target, place);
   }
-}
+
+  /// False: the documents are as large as they get.
+  bool spend(const DocumentedMember& place) {
+    const auto size = about_bytes_a_part * (1 + place.member->parameters.size()) + place.path.size() +
+                      place.member->documentation.size();
+    if (size > left_) out_.is_truncated = true;
+    if (out_.is_truncated) return false;
+    left_ -= size;
+    return true;
+  }
+
+  Places out_;
+  std::vector<const rr::EntityDefinition*> chain_;
+  std::size_t left_ = most_bytes;
+};
 
 }  // namespace
 
-std::vector<DocumentedMember> places_of(const std::string& base, const std::vector<DescribedService>& services) {
-  std::vector<DocumentedMember> out;
-  for (const auto& service : services) {
-    const auto* root = service.types->find_entity(service.root_type);
-    if (!root) continue;
-    const DocumentedMember object{&service,     nullptr, base + "/" + rr::percent_encode(service.name),
-                                  service.name, {},      service.name};
-    add_places(service, *root, object, {}, out);
-  }
-  return out;
+Places places_of(const std::string& base, const std::vector<DescribedService>& services) {
+  PlaceWalk walk;
+  for (const auto& service : services) walk.add_service(base, service);
+  return walk.take();
 }
 
 OrderedJson schemas_of(const std::vector<DescribedService>& services) {

@@ -19,9 +19,14 @@ struct DocumentedMember {
   std::string id;  ///< "Create_axes_position"
 };
 
+struct Places {
+  std::vector<DocumentedMember> members;
+  bool is_truncated = false;  ///< there are more than the documents tell
+};
+
 /// Every member that a path leads to. An object type within itself is listed once; what is behind a varobject is known
 /// at run time only.
-std::vector<DocumentedMember> places_of(const std::string& base, const std::vector<DescribedService>& services);
+Places places_of(const std::string& base, const std::vector<DescribedService>& services);
 /// Of the named types of all services.
 rr::OrderedJson schemas_of(const std::vector<DescribedService>& services);
 rr::OrderedJson arguments_schema(const std::vector<rr::ParameterDefinition>& parameters);
