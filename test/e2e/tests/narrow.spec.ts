@@ -7,6 +7,7 @@ import { webRoot } from "../processes";
 const NAME = "assembly-line-north-building-7-station-12-left-manipulator-spare";
 const PHONE = { width: 390, height: 844 };
 const TABLET = { width: 1024, height: 768 };
+const UPRIGHT = { width: 820, height: 1180 };
 let lab: GuardedLab;
 
 test.beforeAll(async () => {
@@ -73,4 +74,35 @@ test("the tool of a narrow table stands beside its name", async ({ page }) => {
   expect(tool.bottom).toBeLessThanOrEqual(name.bottom + 4);
   const scroll = panel.locator(".panel-scroll");
   expect(await scroll.evaluate((each) => each.scrollWidth - each.clientWidth)).toBe(0);
+});
+
+test("with little room the tools of a board stand beside its stop", async ({ page }) => {
+  await signIn(page, `#/devices/${NAME}/Create?view=board`);
+  for (const size of [PHONE, UPRIGHT]) {
+    await page.setViewportSize(size);
+    const stop = await boxOf(page.getByRole("button", { name: "Stop", exact: true }));
+    const arrange = await boxOf(page.getByRole("button", { name: "Arrange" }));
+    expect(arrange.x).toBeGreaterThan(stop.right);
+    expect(Math.abs(arrange.y + arrange.height / 2 - (stop.y + stop.height / 2))).toBeLessThan(6);
+  }
+});
+
+test("on a phone what is known of a device stands in one column", async ({ page }) => {
+  await page.setViewportSize(PHONE);
+  await signIn(page, "");
+  const facts = page.locator(".device-facts").first().locator("dd");
+  await expect(facts).not.toHaveCount(0);
+  const starts = await facts.evaluateAll((all) => all.map((each) => Math.round(each.getBoundingClientRect().x)));
+  expect(starts.length).toBeGreaterThan(2);
+  expect(new Set(starts).size).toBe(1);
+});
+
+test("the numbers of a plot's legend stand below each other", async ({ page }) => {
+  const board = `{"board":1,"panels":[{"kind":"plot","x":0,"y":0,"w":6,"h":8,"settings":{"member":"state"}}]}`;
+  await page.setViewportSize(PHONE);
+  await signIn(page, `#/devices/${NAME}/Create?view=board&board=${btoa(board)}`);
+  const series = page.locator(".u-legend .u-series");
+  await expect(series).toHaveCount(5); // and the time
+  const starts = await series.evaluateAll((all) => all.map((each) => Math.round(each.getBoundingClientRect().x)));
+  expect(new Set(starts).size).toBe(2);
 });

@@ -223,6 +223,13 @@ test("the chart and the line below it fit in a window that grew", async ({ page 
   }
 });
 
+test("on a tablet the buttons of the chart stand above the controls", async ({ page }) => {
+  await page.setViewportSize({ width: 820, height: 1180 });
+  const button = await page.getByRole("button", { name: "Clear trail" }).boundingBox();
+  const controls = await page.locator(".drive").boundingBox();
+  expect((button?.y ?? NaN) + (button?.height ?? NaN)).toBeLessThanOrEqual(controls?.y ?? NaN);
+});
+
 test("bumps are logged with their time and the bumpers shown", async ({ page }) => {
   await page.getByRole("slider", { name: "Speed" }).fill("500");
   await page.getByRole("slider", { name: "Speed" }).blur();

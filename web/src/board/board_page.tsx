@@ -125,15 +125,17 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
     if (Object.keys(panel.settings).length === 0) return setBoard(next);
     replace(t("Emptied for another service: {0}", nameOf(panel)), next);
   };
+  const showsTools = arranging || board.panels.length === 0; // nobody looks for the way to begin
   return (
     <div class="board-page" data-kept={isKept}>
-      <div class="board-bar">
+      <div class={`board-bar ${showsTools ? "is-arranging" : ""}`}>
         <StopButton object={reach} stop={stop} place={route} safe={safe} />
         <Silence silent={silent} />
         <BoardTools
           board={board}
           name={key}
           arranging={arranging}
+          isOpen={showsTools}
           setArranging={setArranging}
           add={add}
           take={(next) => replace(t("The board is that of the file."), next)}
@@ -272,6 +274,8 @@ interface BoardToolsProps {
   board: Board;
   name: string;
   arranging: boolean;
+  /** Whether all tools are there. */
+  isOpen: boolean;
   setArranging: (on: boolean) => void;
   add: (kind: PanelKind) => void;
   take: (board: Board) => void;
@@ -279,9 +283,8 @@ interface BoardToolsProps {
   fail: (text: string) => void;
 }
 
-function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
+function BoardTools({ board, name, arranging, isOpen, setArranging, add, take, reset, fail }: BoardToolsProps) {
   const file = useRef<HTMLInputElement>(null);
-  const isOpen = arranging || board.panels.length === 0; // nobody looks for the way to begin
   const isFull = board.panels.length >= MOST_PANELS; // a larger one could not be read again
   const [kind, setKind] = useState<PanelKind>("plot");
   const save = (): void =>

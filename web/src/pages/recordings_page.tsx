@@ -33,7 +33,9 @@ export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: Devi
   }, [desk]);
   return (
     <div class="page page-narrow">
-      <h1>{t("Recordings")}</h1>
+      <div class="service-head">
+        <h1>{t("Recordings")}</h1>
+      </div>
       {state && !state.enabled && (
         <section class="empty">
           <p>{t("This gateway records nothing: its configuration has no recordings.")}</p>
