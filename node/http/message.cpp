@@ -127,7 +127,7 @@ bool has_token(std::string_view list, std::string_view token) {
   return false;
 }
 
-bool accepts(std::string_view list, std::string_view name) {
+std::optional<bool> acceptance(std::string_view list, std::string_view name) {
   const auto is_refusal = [](std::string_view parameter) {
     parameter = rr::trim(parameter);
     return equals_ignoring_case(parameter.substr(0, 2), "q=") &&
@@ -138,7 +138,11 @@ bool accepts(std::string_view list, std::string_view name) {
     if (!parts.empty() && equals_ignoring_case(rr::trim(parts[0]), name))
       return std::none_of(parts.begin() + 1, parts.end(), is_refusal);
   }
-  return false;
+  return std::nullopt;
+}
+
+bool accepts(std::string_view list, std::string_view name) {
+  return acceptance(list, name).value_or(false);
 }
 
 }  // namespace rrgate

@@ -6,6 +6,7 @@
 #include <boost/beast/http/string_body.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -69,7 +70,10 @@ std::string format_response_head(const Response& response, bool keeps_alive, uns
 
 /// Whether a comma-separated header value has `token`, in any case.
 bool has_token(std::string_view list, std::string_view token);
-/// Whether a header like Accept names it, in any case, and does not refuse it by q=0. Source: RFC 9110, section 12.4.2.
+/// Whether a header like Accept takes what it names, in any case, or refuses it by q=0; nullopt: it does not name it.
+/// Source: RFC 9110, section 12.4.2.
+std::optional<bool> acceptance(std::string_view list, std::string_view name);
+/// Whether it names it and takes it.
 bool accepts(std::string_view list, std::string_view name);
 bool equals_ignoring_case(std::string_view left, std::string_view right);
 

@@ -159,7 +159,9 @@ rr::Result<> check_presence(GatewayState& gateway, const SharedNode& node, const
                             const Identity& who, std::string_view service) {
   if (const auto shared = node.find_service(service)) {
     const auto& session = *shared->upstream();
-    return session.is_lost() && !session.is_resting() ? rr::Result<>(session.lost_error()) : rr::Result<>();
+    if (session.is_resting())
+      return session.device().state() == DeviceState::online ? rr::Result<>() : session.device().away_error();
+    return session.is_lost() && session.has_tried() ? rr::Result<>(session.lost_error()) : rr::Result<>();
   }
   const auto* device = gateway.devices().find(device_of_node);
   const bool is_away = device && device->state() != DeviceState::online;

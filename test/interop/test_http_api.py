@@ -191,6 +191,7 @@ def test_a_part_of_a_memory_is_written_where_the_request_says_or_not_at_all(gate
     for conditions in ({"If-Match": '"x"'}, {"If-Match": 'W/"x", "y"'}, {"If-None-Match": "*"}):
         for path, value in (("/m_numbers", [9, 9]), ("/p_double", 9)):
             assert ask(gateway, "PUT", path, value, conditions).status == 412
+        assert ask(gateway, "PUT", "/m_fixed", [9], conditions).status == 405  # as without them
     longer = ask(gateway, "PUT", "/m_numbers?offset=1&count=1", [9, 9, 9])
     assert (longer.status, longer.json["error"]["name"]) == (400, "RobotRaconteur.InvalidArgument")
     assert "3 items" in longer.json["detail"]

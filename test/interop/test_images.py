@@ -105,7 +105,7 @@ def test_rows_may_be_longer_than_their_pixels(gateway):
 
 
 @pytest.mark.parametrize("accept, kind", [
-    ("image/png;q=0, image/jpeg", JPEG), ("image/JPEG", JPEG), ("image/png-x, image/jpeg", JPEG),
+    ("image/png;q=0, image/jpeg", JPEG), ("image/png;q=0, image/*", JPEG), ("image/*, image/jpeg;q=0", PNG), ("image/JPEG", JPEG), ("image/png-x, image/jpeg", JPEG),
     ("image/*;q=0, application/json", "application/json")])
 def test_an_image_is_of_an_accepted_type(gateway, accept, kind):
     put(gateway, 2, 2, "mono8", bytes(4))

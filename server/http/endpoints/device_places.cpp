@@ -65,8 +65,8 @@ class PlaceWalk {
 
   /// False: the documents are as large as they get.
   bool spend(const DocumentedMember& place) {
-    const auto size = about_bytes_a_part * (1 + place.member->parameters.size()) + place.path.size() +
-                      place.member->documentation.size();
+    const auto size = about_bytes_a_part * (1 + place.member->parameters.size() + place.indices.size()) +
+                      place.path.size() + place.member->documentation.size();
     if (size > left_) out_.is_truncated = true;
     if (out_.is_truncated) return false;
     left_ -= size;

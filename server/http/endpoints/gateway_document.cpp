@@ -15,7 +15,7 @@ void tell_unreadable(rr::OrderedJson& paths) {
   for (auto& item : paths)
     for (auto& operation : item) {
       if (!operation.contains("responses")) continue;  // the parameters of a path
-      for (const auto* status : {"400", "408", "413", "421", "431", "501"})
+      for (const auto* status : {"400", "408", "413", "415", "421", "431", "501"})
         operation["responses"].emplace(status, rr::OrderedJson{{"$ref", "#/components/responses/Unreadable"}});
     }
 }

@@ -35,6 +35,14 @@ rr::awaitable<rr::Value> body_value(const ObjectRequest& request, const Target& 
   co_return value_or_throw(co_await request.from_body(is_apart(target.member->type), make));
 }
 
+/// What If-Match and If-None-Match say of a value, which is always there and has no ETag: asked where the request would
+/// replace it otherwise. Source: RFC 9110, section 13.1.
+std::optional<Response> precondition_failed(const Request& request) {
+  const auto wanted = request.list(http::field::if_match);
+  if ((wanted.empty() || wanted == "*") && request.list(http::field::if_none_match) != "*") return std::nullopt;
+  return problem_response(412, "the value is there, and has no ETag that If-Match could name");
+}
+
 /// A property, or a wire as a value: the newest in, the newest out.
 rr::awaitable<Response> answer_value(const ObjectRequest& request, const Target& target, rr::CallKind read,
                                      rr::CallKind write) {
@@ -46,6 +54,7 @@ rr::awaitable<Response> answer_value(const ObjectRequest& request, const Target&
     co_return co_await value_response(request, target, value);
   }
   if (request.method() == http::verb::put && can_write) {
+    if (auto failed = precondition_failed(request.request())) co_return std::move(*failed);
     auto value = co_await body_value(request, target);
     co_await target.ask(write, std::move(value));
     co_return request.written_response();
@@ -143,7 +152,7 @@ rr::awaitable<Response> answer_memory_bytes(const ObjectRequest& request, const 
   if (count * item_bytes > max_memory_bytes)
     refuse(rr::ErrorCode::buffer_limit_violation, "that are " + std::to_string(count * item_bytes) +
                                                       " bytes; ask for at most " + std::to_string(max_memory_bytes) +
-                                                      " with Range");
+                                                      " with Range, by GET without If-Range");
   rr::Value items;
   if (count > 0) {
     auto part = target.request(rr::CallKind::memory_read);
@@ -171,6 +180,8 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   const auto allowed = !can_write ? "GET, HEAD" : !can_read ? "PUT" : "GET, HEAD, PUT";
   if (request.is_read() ? !can_read && !target.is_shape : request.method() != http::verb::put || !can_write)
     co_return request.method_response(allowed);
+  if (auto failed = request.is_read() ? std::nullopt : precondition_failed(request.request()))
+    co_return std::move(*failed);
 
   const auto shape = co_await memory_shape(target);
   if (target.is_shape) {
@@ -209,13 +220,6 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   co_return co_await request.value_response(target, items);
 }
 
-/// What If-Match and If-None-Match say of a value, which is always there and has no ETag. Source: RFC 9110,
-/// section 13.1.
-bool may_replace(const Request& request) {
-  const auto wanted = request.list(http::field::if_match);
-  return (wanted.empty() || wanted == "*") && request.list(http::field::if_none_match) != "*";
-}
-
 }  // namespace
 
 rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectRequest& request,
@@ -235,11 +239,6 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
     refuse(rr::ErrorCode::invalid_argument,
            "Content-Range is not for values; a part of a memory is written with ?offset=");
   Response response;
-  if (request.method() == http::verb::put && !may_replace(request.request())) {
-    response = problem_response(412, "the value is there, and has no ETag that If-Match could name");
-    co_await request.writer().send(response);
-    co_return;
-  }
   switch (target.member->kind) {
     case rr::MemberKind::property:
       response = co_await answer_value(request, target, rr::CallKind::property_get, rr::CallKind::property_set);

@@ -13,6 +13,16 @@ namespace rrgate {
 
 namespace {
 
+/// What is named goes before what "image/*" takes, and PNG before JPEG; empty: neither is taken.
+std::string_view accepted_image(std::string_view accept) {
+  const auto png = acceptance(accept, png_type);
+  const auto jpeg = acceptance(accept, jpeg_type);
+  if (png == true) return png_type;
+  if (jpeg == true) return jpeg_type;
+  if (!accepts(accept, "image/*") || (png && jpeg)) return {};
+  return png ? jpeg_type : png_type;
+}
+
 std::string_view media_type(std::string_view header) {
   const auto type = header.substr(0, header.find(';'));
   return type.substr(0, type.find_last_not_of(' ') + 1);
@@ -130,10 +140,8 @@ ObjectRequest::ObjectRequest(ResponseWriter& writer, GatewayState& gateway) : wr
   if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
   const auto as = option("as").value_or("");
   wants_motion_ = as == "mjpeg" || (as.empty() && accepts(accept, "multipart/x-mixed-replace"));
-  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts(accept, jpeg_type));
-  const bool takes_png = as == "png" || (as.empty() && (accepts(accept, png_type) || accepts(accept, "image/*")));
-  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts(accept, png_type) ? jpeg_type : png_type;
-  if (as == "jpeg") wanted_image_ = jpeg_type;
+  if (as == "jpeg" || as == "png") wanted_image_ = as == "jpeg" ? jpeg_type : png_type;
+  if (as.empty()) wanted_image_ = accepted_image(accept);
   form_ = json_form(request());
   form_.has_bytes = wanted_ == BodyForm::cbor;
 }

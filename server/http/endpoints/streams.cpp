@@ -167,7 +167,11 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
     const std::string& image = **jpeg;
     // The client may take its time: by then the frame, with what is counted for it, has gone.
     auto room = writer.memory().sibling();
-    if (!room.resize(image.size())) continue;
+    if (!room.resize(image.size())) {
+      gateway.reject(Rejection::memory);
+      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", "no memory is left for it"}});
+      continue;
+    }
     const auto head = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(image.size()) + "\r\n\r\n";
     const std::array<std::string_view, 3> part{head, image, "\r\n--frame\r\n"};
     failed = co_await writer.write(part);
