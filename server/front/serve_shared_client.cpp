@@ -159,9 +159,11 @@ rr::Result<> check_presence(GatewayState& gateway, const SharedNode& node, const
                             const Identity& who, std::string_view service) {
   if (const auto shared = node.find_service(service)) {
     const auto& session = *shared->upstream();
-    if (session.is_resting())
-      return session.device().state() == DeviceState::online ? rr::Result<>() : session.device().away_error();
-    return session.is_lost() && session.has_tried() ? rr::Result<>(session.lost_error()) : rr::Result<>();
+    if (!session.is_lost()) return {};
+    if (session.device().state() != DeviceState::online) return session.device().away_error();
+    // One that rests, or is being opened, tells its clients if it can't be.
+    if (session.is_resting() || session.is_attempting() || !session.has_tried()) return {};
+    return session.lost_error();
   }
   const auto* device = gateway.devices().find(device_of_node);
   const bool is_away = device && device->state() != DeviceState::online;

@@ -310,7 +310,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
 
 void Gateway::note_devices() {
   shared_.sync(devices_);
-  if (own_service_) own_service_->look_at_devices();
+  if (own_service_) own_service_->look_soon();
 }
 
 void Gateway::end_those_not_good() {

@@ -135,6 +135,14 @@ void GatewayService::stop() {
   node_.stop();
 }
 
+void GatewayService::look_soon() {
+  if (std::exchange(looks_soon_, true)) return;
+  node_.post([this] {
+    looks_soon_ = false;
+    look_at_devices();
+  });
+}
+
 void GatewayService::look_at_devices() {
   auto before = std::exchange(known_, {});
   for (const auto& device : gateway_.devices().all()) {

@@ -29,11 +29,12 @@ class GatewayService {
   const std::shared_ptr<Device>& device() const { return device_; }
   void start();
   void stop();
-  /// Tells its clients what has become of the devices. Called when some have joined or gone, too: leases are told of
-  /// from then on.
-  void look_at_devices();
+  /// Devices have joined or gone. Not at once: what is told of them may fail, and whoever brought them must not.
+  void look_soon();
 
  private:
+  /// Tells its clients what has become of the devices; leases are told of from then on.
+  void look_at_devices();
   void add_members();
   rr::Value describe(const Device& device) const;
   rr::Value list_devices() const;
@@ -51,6 +52,7 @@ class GatewayService {
   std::shared_ptr<rr::Service> service_;
   std::shared_ptr<Device> device_;
   std::map<std::string, DeviceState> known_;
+  bool looks_soon_ = false;
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 };
 

@@ -261,7 +261,7 @@ void SharedClient::end_soon(std::string reason) {
   end_reason_ = std::move(reason);
   // Not here: whoever sends goes through a list of clients.
   post([this, self = shared_from_this()] {
-    session_.close_service(rr::read_clocks());
+    close_service();
     close(rr::make_error(rr::ErrorCode::connection_error, end_reason_));
   });
 }

@@ -454,12 +454,22 @@ rr::NodeIdentity identity_of(const Device& device) {
   return {url.node_id.value_or(rr::NodeId{}), url.node_name};
 }
 
+bool is_configured(const Device& device) {
+  return !device.config().is_found && !device.config().is_served;
+}
+
+/// A client that asks for one that is away gets another way to the same node: not another robot of that name, and
+/// nothing that says itself which node it is where the configuration says it of one.
+bool is_way_to(const Device& away, const Device& online) {
+  const auto id = identity_of(away).id;
+  return (id.is_any() || id == identity_of(online).id) && (is_configured(online) || !is_configured(away));
+}
+
 }  // namespace
 
 Device* DeviceRegistry::find_configured(const rr::NodeId& node_id) const {
   for (const auto& device : devices_)
-    if (!device->config().is_found && !device->config().is_served && identity_of(*device).id == node_id)
-      return device.get();
+    if (is_configured(*device) && identity_of(*device).id == node_id) return device.get();
   return nullptr;
 }
 
@@ -475,8 +485,9 @@ Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_n
     const auto identity = identity_of(*device);
     const bool is_it =
         (node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name);
-    if (is_it && device->state() == DeviceState::online) return device.get();
-    if (is_it && !away) away = device.get();
+    if (!is_it) continue;
+    if (device->state() == DeviceState::online && (!away || is_way_to(*away, *device))) return device.get();
+    if (!away) away = device.get();
   }
   return away;
 }

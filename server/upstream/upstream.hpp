@@ -116,6 +116,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// comes it is opened to see what there is, and rests at once.
   void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
   bool is_resting() const { return is_resting_; }
+  bool is_attempting() const { return is_attempting_; }  ///< it is being opened
   /// Whether it stays open though none of its own clients uses it.
   void hold(bool is_held);
   /// Has it opened again where it rests.

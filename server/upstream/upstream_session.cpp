@@ -195,6 +195,7 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, std::function<
           {{"device", device}, {"service", self->service_}, {"clients", self->clients_.size()}});
     } else {
       self->break_off();
+      self->tell_lost(self->lost_error(done.error()));  // who came while it was being opened has not heard of it
       const auto level = self->use_ == UpstreamUse::all_clients ? LogLevel::warning : LogLevel::debug;
       log(level, "session can't be opened",
           {{"device", device}, {"service", self->service_}, {"error", done.error().message}});

@@ -266,6 +266,9 @@ def test_a_device_that_is_lost_behind_the_far_gateway_is_lost_at_the_near_one(no
 
 def test_gateways_that_share_each_other_are_offline(tmp_path):
     """Neither shows a device that is nowhere, and what they say of each other does not grow."""
+    def device_of(port):
+        return read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"][0]
+
     ports, gateways = [free_port(), free_port()], []
     try:
         for port, other in zip(ports, reversed(ports)):
@@ -275,8 +278,8 @@ def test_gateways_that_share_each_other_are_offline(tmp_path):
                 "listen": [f"127.0.0.1:{port}"], "devices": [device], "retry": RETRY, "timeouts": {"connect_ms": 500}}))
         for gateway, port in zip(gateways, ports):
             gateway.wait_for("client connected", 20)
-            (listed,) = read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"]
-            assert listed["state"] == "offline" and len(listed["last_error"]) < 1000, listed
+            gateway.process.wait_until(lambda: device_of(port)["state"] == "offline")
+            assert len(device_of(port)["last_error"]) < 1000
     finally:
         for gateway in gateways:
             gateway.process.stop()

@@ -140,7 +140,8 @@ TEST_CASE("a reload with shorter waits ends the wait that is under way") {
   io.run_for(seconds(2));
 }
 
-TEST_CASE("of devices that are one node a client gets one that is online") {
+TEST_CASE("of devices that are one node a client gets one that is online, and no other robot of its name") {
+  const bool is_another = GENERATE(false, true);
   boost::asio::io_context io{1};
   rr::Node node(io, "test.arm");
   const auto port = node.listen("rr+tcp://127.0.0.1:0");
@@ -149,7 +150,8 @@ TEST_CASE("of devices that are one node a client gets one that is online") {
     DeviceConfig made;
     made.name = where;
     const auto its_port = made.name == "live" ? std::to_string(port) : made.name;
-    made.url = rr::parse_url("rr+tcp://127.0.0.1:" + its_port + "/?nodename=test.arm&service=x").value();
+    const std::string id = is_another && made.name != "live" ? "nodeid={11111111-2222-3333-4444-555555555555}&" : "";
+    made.url = rr::parse_url("rr+tcp://127.0.0.1:" + its_port + "/?" + id + "nodename=test.arm&service=x").value();
     config.devices.push_back(std::move(made));
   }
   DeviceRegistry registry(io.get_executor(), config);
@@ -160,7 +162,7 @@ TEST_CASE("of devices that are one node a client gets one that is online") {
   const auto end = std::chrono::steady_clock::now() + seconds(10);
   while (live->state() != DeviceState::online && std::chrono::steady_clock::now() < end)
     io.run_one_for(milliseconds(50));
-  CHECK(registry.route({}, "test.arm") == live);
+  CHECK(registry.route({}, "test.arm") == (is_another ? away : live));
   CHECK(registry.route(node.identity().id, {}) == live);
   registry.stop();
   node.stop();
