@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 #include <memory>
+#include <set>
 
 #include "server/json/json.hpp"
 
@@ -83,4 +84,57 @@ TEST_CASE("documents of many paths through few objects are bounded, and say so")
     CHECK(response.body->size() < 8'000'000);
     CHECK_THAT(*response.body, Contains("\"x-rr-truncated\":true"));
   }
+}
+
+TEST_CASE("members whose paths differ only in '/' and '_' have ids of their own, and are in each document") {
+  const auto types = registry({R"(service test.robot
+stdver 0.10
+object Arm
+    property double speed
+    event done()
+    memory double[] data
+    wire double w
+    pipe double p
+    function void stop()
+end
+object Robot
+    objref Arm arm
+    property double arm_speed
+    event arm_done()
+    memory double[] arm_data
+    wire double arm_w
+    pipe double arm_p
+    function void arm_stop()
+end
+)"});
+  const auto document = [&types](const std::string& name) {
+    const auto response = device_document(
+        name, "d", "/d", {{"socket", "test.robot.Robot", types.get()}, {"arm_w", "test.robot.Robot", types.get()}}, {});
+    REQUIRE(response.body);
+    return rr::OrderedJson::parse(*response.body);
+  };
+  std::set<std::string> ids, streams;
+  std::size_t operations = 0;
+  const auto open_api = document("openapi.json");
+  for (const auto& [path, item] : open_api["paths"].items())
+    for (const std::string method : {"get", "put", "post"})
+      if (item.contains(method)) {
+        ids.insert(item[method]["operationId"].get<std::string>());
+        ++operations;
+      }
+  CHECK(operations == 2 * 2 * 10);
+  CHECK(ids.size() == operations);
+
+  const auto async_api = document("asyncapi.json");
+  for (const auto& [id, channel] : async_api["channels"].items()) streams.insert(channel["address"].get<std::string>());
+  CHECK(streams == std::set<std::string>{"/d/socket", "/d/socket/arm/done", "/d/socket/arm/w", "/d/socket/arm/p",
+                                         "/d/socket/arm_done", "/d/socket/arm_w", "/d/socket/arm_p", "/d/arm_w",
+                                         "/d/arm_w/arm/done", "/d/arm_w/arm/w", "/d/arm_w/arm/p", "/d/arm_w/arm_done",
+                                         "/d/arm_w/arm_w", "/d/arm_w/arm_p"});
+  CHECK(async_api["operations"].size() == 12 + 2 * 2);
+
+  const auto thing = document("thing-description.json");
+  CHECK(thing["properties"].size() == 2 * 4);
+  CHECK(thing["events"].size() == 2 * 4);
+  CHECK(thing["actions"].size() == 2 * 2);
 }

@@ -57,7 +57,7 @@ OrderedJson socket_messages() {
 void add_sockets(const std::string& base, const std::vector<DescribedService>& services, OrderedJson& channels,
                  OrderedJson& operations) {
   for (const auto& service : services) {
-    const auto id = "socket_" + service.name;
+    const auto id = socket_id(service);
     add_key(channels, id) = {
         {"address", base + "/" + rr::percent_encode(service.name)},
         {"description", "JSON messages over a WebSocket, subprotocol rrgate.json.v1; also at objects below."},

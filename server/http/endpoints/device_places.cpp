@@ -1,6 +1,7 @@
 #include "server/http/endpoints/device_places.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "core/session/url.hpp"
 #include "server/json/schema.hpp"
@@ -24,6 +25,7 @@ bool has_index(const rr::MemberDefinition& objref) {
 /// Many objrefs to few types make many paths.
 class PlaceWalk {
  public:
+  void reserve_id(const std::string& id) { ++members_of_id_[id]; }
   void add_service(const std::string& base, const DescribedService& service) {
     const auto* root = service.types->find_entity(service.root_type);
     if (!root) return;
@@ -44,9 +46,16 @@ class PlaceWalk {
       if (member.kind == rr::MemberKind::objref)
         add_object(member, std::move(place));
       else
-        out_.members.push_back(std::move(place));
+        add_member(std::move(place));
     }
     chain_.pop_back();
+  }
+
+  /// Names never end in '_': what is appended makes the id of no other member.
+  void add_member(DocumentedMember place) {
+    const auto members_before = members_of_id_[place.id]++;
+    place.id.append(members_before, '_');
+    out_.members.push_back(std::move(place));
   }
 
   void add_object(const rr::MemberDefinition& member, DocumentedMember place) {
@@ -74,6 +83,7 @@ class PlaceWalk {
   }
 
   Places out_;
+  std::map<std::string, std::size_t> members_of_id_;
   std::vector<const rr::EntityDefinition*> chain_;
   std::size_t left_ = most_bytes;
 };
@@ -82,8 +92,13 @@ class PlaceWalk {
 
 Places places_of(const std::string& base, const std::vector<DescribedService>& services) {
   PlaceWalk walk;
+  for (const auto& service : services) walk.reserve_id(socket_id(service));
   for (const auto& service : services) walk.add_service(base, service);
   return walk.take();
+}
+
+std::string socket_id(const DescribedService& service) {
+  return "socket_" + service.name;
 }
 
 OrderedJson schemas_of(const std::vector<DescribedService>& services) {

@@ -16,7 +16,7 @@ struct DocumentedMember {
   std::string path;         ///< "/api/v1/devices/d/Create/axes/{axes}/position"
   std::string object_path;  ///< "Create.axes[{axes}]"
   std::vector<std::string> indices;
-  std::string id;  ///< "Create_axes_position"
+  std::string id;  ///< "Create_axes_position", which no other member has
 };
 
 struct Places {
@@ -27,6 +27,8 @@ struct Places {
 /// Every member that a path leads to. An object type within itself is listed once; what is behind a varobject is known
 /// at run time only.
 Places places_of(const std::string& base, const std::vector<DescribedService>& services);
+/// The id of the WebSocket of a service, which no member has.
+std::string socket_id(const DescribedService& service);
 /// Of the named types of all services.
 rr::OrderedJson schemas_of(const std::vector<DescribedService>& services);
 rr::OrderedJson arguments_schema(const std::vector<rr::ParameterDefinition>& parameters);
