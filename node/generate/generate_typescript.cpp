@@ -28,28 +28,56 @@ constexpr std::string_view words_of_the_language[] = {
     "typeof", "undefined", "unique",     "unknown",   "var",       "void",     "while",    "with",       "yield"};
 
 /// Global types that the output uses, and what it imports from rrgate-client.
-constexpr std::string_view used_types[] = {"Array",          "AsyncGenerator",
-                                           "BigInt64Array",  "BigUint64Array",
-                                           "Float32Array",   "Float64Array",
-                                           "Int16Array",     "Int32Array",
-                                           "Int8Array",      "Map",
-                                           "Object",         "Pick",
-                                           "Promise",        "Uint16Array",
-                                           "Uint32Array",    "Uint8Array",
-                                           "CallbackMember", "Complex",
-                                           "EventMember",    "ExactValue",
-                                           "FunctionMember", "GeneratorMember",
-                                           "MemoryMember",   "MultiDim",
-                                           "ObjectInfo",     "ObjRefMember",
-                                           "PipeMember",     "PropertyMember",
-                                           "RemoteObject",   "RobotRaconteurError",
-                                           "RrValue",        "WireMember"};
+constexpr std::string_view used_types[] = {"Array",
+                                           "AsyncGenerator",
+                                           "BigInt64Array",
+                                           "BigUint64Array",
+                                           "Float32Array",
+                                           "Float64Array",
+                                           "Int16Array",
+                                           "Int32Array",
+                                           "Int8Array",
+                                           "Map",
+                                           "Object",
+                                           "Omit",
+                                           "Pick",
+                                           "Promise",
+                                           "Uint16Array",
+                                           "Uint32Array",
+                                           "Uint8Array",
+                                           "CallbackMember",
+                                           "Complex",
+                                           "EventMember",
+                                           "ExactValue",
+                                           "FunctionMember",
+                                           "GeneratorMember",
+                                           "MemoryMember",
+                                           "MultiDim",
+                                           "ObjectInfo",
+                                           "ObjRefMember",
+                                           "PipeMember",
+                                           "PropertyMember",
+                                           "RemoteObject",
+                                           "RobotRaconteurError",
+                                           "RrValue",
+                                           "WireMember"};
 
 /// Members that the client does not put on its objects, because JavaScript calls them by itself.
 constexpr std::string_view implicit_names[] = {"then", "toString", "toJSON", "valueOf"};
 
 bool contains(std::span<const std::string_view> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::string with_underscores(std::string qualified_name) {
+  std::replace(qualified_name.begin(), qualified_name.end(), '.', '_');
+  return qualified_name;
+}
+
+std::string fields_text(const std::map<std::string, std::string>& types) {
+  std::vector<std::string> fields;
+  for (const auto& [name, type] : types) fields.push_back("readonly " + name + ": " + type);
+  return fields.empty() ? "{}" : "{ " + joined(fields, "; ") + " }";
 }
 
 /// Values that the client receives, or those that it may send, which are more.
@@ -69,6 +97,7 @@ class TypeScriptEmitter {
   void emit_entity(const ServiceDefinition& definition, const EntityDefinition& item);
   void emit_object(const ServiceDefinition& definition, const EntityDefinition& item);
   void emit_constants(const std::string& name, const EntityDefinition& item);
+  std::map<std::string, std::string> constant_types(std::span<const ConstantDefinition> constants);
   /// What `$.constants` gives: those of the definition and of the type, which count where both have one of a name.
   std::string constants_text(const ServiceDefinition& definition, const EntityDefinition& item);
   std::string constant_text(const ConstantDefinition& item, std::span<const ConstantDefinition> scope, int& budget);
@@ -91,8 +120,10 @@ class TypeScriptEmitter {
 
   const DefinitionSet& set_;
   TypeScriptFlavour flavour_;
-  std::map<std::string, std::string> names_ = {};        ///< by qualified name
-  std::map<std::string, std::string> value_names_ = {};  ///< of enums: the type of the names of their values
+  std::map<std::string, std::string> names_ = {};            ///< by qualified name
+  std::map<std::string, std::string> constants_names_ = {};  ///< by service: the type of the definition's constants
+  std::map<std::string, std::string> value_names_ = {};      ///< of enums: the type of the names of their values
+  std::map<std::string, std::string> definition_constants_ = {};  ///< types of those of the one that is being written
   std::set<std::string> imports_ = {};
   SourceWriter out_{DocStyle::block};
 };
@@ -129,17 +160,16 @@ void TypeScriptEmitter::choose_names() {
   }
   for (const auto& [name, service] : services) {
     auto chosen = name;
-    if (services.count(name) > 1) {
-      chosen = service + '_' + name;
-      std::replace(chosen.begin(), chosen.end(), '.', '_');
-    }
+    if (services.count(name) > 1) chosen = with_underscores(service + '.' + name);
     names_.emplace(service + '.' + name, choose_unused(chosen));
   }
-  for (const auto* definition : set_.in_order())
+  for (const auto* definition : set_.in_order()) {
+    constants_names_.emplace(definition->name, choose_unused(with_underscores(definition->name + ".Constants")));
     for (const auto& item : definition->enums) {
       const auto key = definition->name + '.' + item.name;
       value_names_.emplace(key, choose_unused(names_.at(key) + "Name"));
     }
+  }
 }
 
 void TypeScriptEmitter::emit_definition(const ServiceDefinition& definition) {
@@ -154,6 +184,13 @@ void TypeScriptEmitter::emit_definition(const ServiceDefinition& definition) {
   }
   for (const auto& item : definition.enums) emit_enum(definition, item);
   for (const auto& item : definition.exceptions) emit_exception(definition, item);
+  definition_constants_ = constant_types(all_constants(definition));
+  const bool has_objects =
+      std::ranges::find(definition.entities, EntityKind::object, &EntityDefinition::kind) != definition.entities.end();
+  if (has_objects && !definition_constants_.empty()) {
+    out_.line("export type " + constants_names_.at(definition.name) + " = " + fields_text(definition_constants_) + ";");
+    out_.gap();
+  }
   for (const auto& item : definition.entities) emit_entity(definition, item);
 }
 
@@ -239,16 +276,24 @@ void TypeScriptEmitter::emit_object(const ServiceDefinition& definition, const E
   }
 }
 
-std::string TypeScriptEmitter::constants_text(const ServiceDefinition& definition, const EntityDefinition& item) {
+std::map<std::string, std::string> TypeScriptEmitter::constant_types(std::span<const ConstantDefinition> constants) {
   std::map<std::string, std::string> types;
-  for (const auto& scope : {all_constants(definition), all_constants(item)})
-    for (const auto& constant : scope) {
-      int budget = 100;
-      types[constant.name] = constant_text(constant, scope, budget);
-    }
-  std::vector<std::string> fields;
-  for (const auto& [name, type] : types) fields.push_back("readonly " + name + ": " + type);
-  return fields.empty() ? "{}" : "{ " + joined(fields, "; ") + " }";
+  for (const auto& constant : constants) {
+    int budget = 100;
+    types[constant.name] = constant_text(constant, constants, budget);
+  }
+  return types;
+}
+
+std::string TypeScriptEmitter::constants_text(const ServiceDefinition& definition, const EntityDefinition& item) {
+  const auto own = constant_types(all_constants(item));
+  if (definition_constants_.empty()) return fields_text(own);
+  std::string inherited = constants_names_.at(definition.name);
+  std::vector<std::string> hidden;
+  for (const auto& [name, type] : own)
+    if (definition_constants_.contains(name)) hidden.push_back('"' + name + '"');
+  if (!hidden.empty()) inherited = "Omit<" + inherited + ", " + joined(hidden, " | ") + ">";
+  return own.empty() ? inherited : inherited + " & " + fields_text(own);
 }
 
 /// Struct constants may share others again and again: what is written out is bounded.

@@ -26,8 +26,10 @@ export interface Colour {
   red: number;
 }
 
+export type test_lamp_Constants = { readonly most: number };
+
 export interface Lamp {
-  readonly $: ObjectInfo<Lamp, { readonly most: number }>;
+  readonly $: ObjectInfo<Lamp, test_lamp_Constants>;
   readonly colour: Pick<PropertyMember<Colour | null>, "get">;
 }
 )";
@@ -85,7 +87,8 @@ TEST_CASE("generate: what only compat mode takes becomes code all the same") {
                          Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;"));
   CHECK_THAT(run_command("generate", {"ts", "--compat", file}).output,
              Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;") &&
-                 Contains("readonly $: ObjectInfo<X, { readonly A_B: number }>;"));
+                 Contains("export type test_class_Constants = { readonly A_B: number };") &&
+                 Contains("readonly $: ObjectInfo<X, test_class_Constants>;"));
 }
 
 TEST_CASE("generate ts: an enum without values has no names") {
@@ -95,6 +98,22 @@ TEST_CASE("generate ts: an enum without values has no names") {
     CHECK(run_command("generate", {"ts", "--compat", file, "-o", types}).code == exit_ok);
     CHECK_THAT(folder.read(types.substr(types.rfind('/') + 1)), Contains("export type ModeName = never;\n"));
   }
+}
+
+TEST_CASE("generate ts: constants of a definition are written once, however many objects have them") {
+  const Folder folder;
+  const auto types_of = [&folder](int count) {
+    std::string text = "service test.many\nstdver 0.10\n";
+    const auto name = [](const char* kind, int number) { return kind + std::to_string(number); };
+    for (int number = 0; number < count; ++number) text += "constant int32 " + name("c", number) + " 1\n";
+    for (int number = 0; number < count; ++number)
+      text += "object " + name("o", number) + "\n    constant string " + name("c", number) + " \"own\"\nend\n";
+    return run_command("generate", {"ts", folder.write("many.robdef", text)}).output;
+  };
+  CHECK_THAT(types_of(2),
+             Contains("export type test_many_Constants = { readonly c0: number; readonly c1: number };\n") &&
+                 Contains("ObjectInfo<o1, Omit<test_many_Constants, \"c1\"> & { readonly c1: string }>;"));
+  CHECK(types_of(200).size() < 3 * types_of(100).size());
 }
 
 TEST_CASE("generate: mistakes") {
