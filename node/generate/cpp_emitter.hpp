@@ -33,7 +33,7 @@ class CppEmitter {
   void emit_constants(const std::vector<ConstantDefinition>& constants, std::string_view storage,
                       const std::string& scope);
   void emit_constants_of(const EntityDefinition& item) {
-    emit_constants(all_constants(item), "static constexpr ", types_.declared_name(item.qualified_name) + "::");
+    emit_constants(all_constants(item), "static constexpr ", types_.type_name(item.qualified_name) + "::");
   }
   void emit_namedarray(const EntityDefinition& item);
   void emit_fields(const EntityDefinition& item);

@@ -65,8 +65,8 @@ std::string cpp_file_name(std::string_view service) {
   return joined(segments_of(service, [](std::string_view segment) { return std::string(segment); }), "__");
 }
 
-void CppTypes::enter(const EntityDefinition* entity) {
-  entity_ = entity;
+void CppTypes::enter(std::string class_name) {
+  class_name_ = std::move(class_name);
 }
 
 std::string CppTypes::parameter_name(std::string_view name) const {
@@ -77,13 +77,13 @@ std::string CppTypes::parameter_name(std::string_view name) const {
 }
 
 std::string CppTypes::member_name(std::string_view name) const {
-  auto chosen = cpp_word(name);
-  // A member that is called like its class would be a constructor.
-  const auto& own = entity_->qualified_name;
-  while (chosen == declared_name(own) || chosen == declared_name(own, "Client") ||
-         chosen == declared_name(own, "AsyncClient") || chosen == declared_name(own, "Service"))
-    chosen += '_';
-  return chosen;
+  // What is called like its class would be a constructor.
+  const auto chosen = cpp_word(name);
+  return chosen + (chosen == class_name_ ? "_" : "");
+}
+
+std::string CppTypes::constant_name(std::string_view name) const {
+  return class_name_.empty() ? declared_name(definition_.name + '.' + std::string(name)) : member_name(name);
 }
 
 std::string CppTypes::declared_name(std::string_view qualified_name, std::string_view suffix) const {
@@ -104,12 +104,8 @@ std::string CppTypes::declared_name(std::string_view qualified_name, std::string
 std::string CppTypes::name(std::string_view qualified_name, std::string_view suffix) const {
   const auto service = split_qualified(qualified_name).service;
   const auto declared = declared_name(qualified_name, suffix);
-  const auto is_hidden = [&] {
-    if (!entity_) return false;
-    return std::any_of(entity_->members.begin(), entity_->members.end(),
-                       [&](const auto& member) { return member_name(member.name) == declared; });
-  };
-  if (service == definition_.name && !is_hidden()) return declared;
+  // In a class, its members and those of its bases hide the names of the namespace.
+  if (service == definition_.name && class_name_.empty()) return declared;
   return "::" + cpp_namespace(service) + "::" + declared;
 }
 

@@ -16,13 +16,13 @@ std::string cpp_namespace(std::string_view service);
 /// "com__example__robot".
 std::string cpp_file_name(std::string_view service);
 
-/// The scope of one class: names of its members hide those of types.
+/// Names as they are in the namespace of a definition, or in one of its classes.
 class CppTypes {
  public:
   CppTypes(const DefinitionSet& set, const rr::ServiceDefinition& definition) : set_(set), definition_(definition) {}
 
-  /// From now on inside a class with these members; nullptr: in the namespace.
-  void enter(const rr::EntityDefinition* entity);
+  /// From now on inside the class that is declared by this name; empty: in the namespace.
+  void enter(std::string class_name);
 
   /// A type as a value is held: "std::vector<double>".
   std::string value(const rr::TypeDefinition& type) const;
@@ -38,6 +38,8 @@ class CppTypes {
   std::string declared_name(std::string_view qualified_name, std::string_view suffix = {}) const;
   /// A member of the class that was entered.
   std::string member_name(std::string_view name) const;
+  /// A constant of the class that was entered, or of the definition.
+  std::string constant_name(std::string_view name) const;
   std::string parameter_name(std::string_view name) const;
 
  private:
@@ -47,7 +49,7 @@ class CppTypes {
 
   const DefinitionSet& set_;
   const rr::ServiceDefinition& definition_;
-  const rr::EntityDefinition* entity_ = nullptr;
+  std::string class_name_ = {};
 };
 
 }  // namespace rrgate

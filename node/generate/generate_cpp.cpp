@@ -78,18 +78,21 @@ void CppEmitter::emit_constants(const std::vector<ConstantDefinition>& constants
                                 const std::string& scope) {
   for (const auto& item : constants) {
     header_.documentation(item.documentation);
+    const auto name = types_.constant_name(item.name);
     if (!is_struct_constant(item)) {
-      header_.line(std::string(storage) + cpp_constant(item, cpp_word(item.name)) + ";");
+      header_.line(std::string(storage) + cpp_constant(item, name) + ";");
       continue;
     }
-    header_.open("struct " + cpp_word(item.name) + " {");
+    header_.open("struct " + name + " {");
+    auto inside = types_;
+    inside.enter(name);
     const auto value = value_of(item);
     for (const auto& field : *std::get_if<std::vector<ConstantField>>(&value.data)) {
       const auto target = std::find_if(constants.begin(), constants.end(),
                                        [&](const auto& other) { return other.name == field.constant; });
       const bool is_type = is_struct_constant(*target);
-      header_.line((is_type ? "using " : "static constexpr auto ") + cpp_word(field.name) + " = " + scope +
-                   cpp_word(field.constant) + ";");
+      header_.line((is_type ? "using " : "static constexpr auto ") + inside.member_name(field.name) + " = " + scope +
+                   types_.constant_name(field.constant) + ";");
     }
     header_.close("};");
   }
@@ -105,21 +108,21 @@ void CppEmitter::emit_exception(const ExceptionDefinition& item) {
   header_.line(
       "    : rr::Exception(rr::declared_error(rr_type, std::move(message), std::move(sub_name), "
       "std::move(param))) {}");
-  header_.line("explicit " + name + "(rr::Error error) : rr::Exception(std::move(error)) {}");
+  header_.line("explicit " + name + "(rr::Error rr_error) : rr::Exception(std::move(rr_error)) {}");
   header_.close("};");
   header_.gap();
 }
 
 void CppEmitter::emit_exceptions() {
   header_.line("/// Throws the exception of this definition, or of one that it imports, that an error stands for.");
-  header_.line("void rr_throw_declared(const rr::Error& error);");
-  source_.open("void rr_throw_declared([[maybe_unused]] const rr::Error& error) {");
+  header_.line("void rr_throw_declared(const rr::Error& rr_error);");
+  source_.open("void rr_throw_declared([[maybe_unused]] const rr::Error& rr_error) {");
   for (const auto& item : definition_.exceptions) {
     const auto name = types_.declared_name(qualified(item.name));
-    source_.line("if (error.name == " + name + "::rr_type) throw " + name + "(error);");
+    source_.line("if (rr_error.name == " + name + "::rr_type) throw " + name + "(rr_error);");
   }
   for (const auto& import : definition_.imports)
-    source_.line("::" + cpp_namespace(import.name) + "::rr_throw_declared(error);");
+    source_.line("::" + cpp_namespace(import.name) + "::rr_throw_declared(rr_error);");
   source_.close();
   source_.gap();
 }
@@ -144,7 +147,7 @@ std::vector<const EntityDefinition*> CppEmitter::in_order(EntityKind kind) const
 // --- objects ---
 
 void CppEmitter::emit_object(const EntityDefinition& item) {
-  types_.enter(&item);
+  types_.enter(types_.declared_name(item.qualified_name));
   header_.line("/// Constants of the object type.");
   header_.open("struct " + types_.declared_name(item.qualified_name) + " {");
   header_.line("static constexpr std::string_view rr_type = \"" + item.qualified_name + "\";");
@@ -154,7 +157,7 @@ void CppEmitter::emit_object(const EntityDefinition& item) {
   emit_client(item);
   emit_async_client(item);
   emit_service(item);
-  types_.enter(nullptr);
+  types_.enter({});
 }
 
 // --- the definition itself ---

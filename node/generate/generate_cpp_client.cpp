@@ -5,6 +5,7 @@ namespace rrgate {
 
 void CppEmitter::emit_client(const EntityDefinition& item) {
   const auto name = types_.declared_name(item.qualified_name, "Client");
+  types_.enter(name);
   header_.documentation(item.documentation);
   header_.line("class " + name + " : public rr::ClientStub {");
   header_.open(" public:");
@@ -12,7 +13,7 @@ void CppEmitter::emit_client(const EntityDefinition& item) {
   header_.line("explicit " + name + "(rr::RemoteObject object);");
   header_.gap();
   source_.line(name + "::" + name + "(rr::RemoteObject object)");
-  source_.line("    : ClientStub(std::move(object), " + types_.type_name(item.qualified_name) +
+  source_.line("    : rr::ClientStub(std::move(object), " + types_.type_name(item.qualified_name) +
                "::rr_type, rr_throw_declared) {}");
   source_.gap();
   for (const auto& member : item.members) emit_client_member(name, member);
@@ -83,6 +84,7 @@ std::string CppEmitter::handle_type(const std::string& prefix, const MemberDefin
 
 void CppEmitter::emit_async_client(const EntityDefinition& item) {
   const auto name = types_.declared_name(item.qualified_name, "AsyncClient");
+  types_.enter(name);
   header_.line("/// " + types_.declared_name(item.qualified_name, "Client") +
                " for programs on Asio: what waits there takes a completion token as its last argument here.");
   header_.line("class " + name + " : public rr::AsyncClientStub {");
@@ -93,7 +95,7 @@ void CppEmitter::emit_async_client(const EntityDefinition& item) {
   header_.line("explicit " + name + "(rr::AsyncObject object);");
   header_.gap();
   source_.line(name + "::" + name + "(rr::AsyncObject object)");
-  source_.line("    : AsyncClientStub(std::move(object), " + types_.type_name(item.qualified_name) +
+  source_.line("    : rr::AsyncClientStub(std::move(object), " + types_.type_name(item.qualified_name) +
                "::rr_type, rr_throw_declared) {}");
   source_.gap();
   for (const auto& member : item.members) emit_async_client_member(member);

@@ -8,6 +8,7 @@ namespace rrgate {
 
 void CppEmitter::emit_service(const EntityDefinition& item) {
   const auto name = types_.declared_name(item.qualified_name, "Service");
+  types_.enter(name);
   std::vector<std::string> bases;
   for (const auto& base : item.implements)
     bases.push_back("public virtual " + types_.service_name(base.qualified_name));

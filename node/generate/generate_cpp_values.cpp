@@ -4,7 +4,7 @@
 namespace rrgate {
 
 void CppEmitter::emit_namedarray(const EntityDefinition& item) {
-  types_.enter(&item);
+  types_.enter(types_.declared_name(item.qualified_name));
   header_.documentation(item.documentation);
   header_.open("struct " + types_.declared_name(item.qualified_name) + " {");
   TypeDefinition number;
@@ -31,12 +31,12 @@ void CppEmitter::emit_namedarray(const EntityDefinition& item) {
   header_.line("bool operator==(const " + types_.declared_name(item.qualified_name) + "&) const = default;");
   header_.close("};");
   header_.gap();
-  types_.enter(nullptr);
+  types_.enter({});
 }
 
 /// Structs and pods.
 void CppEmitter::emit_fields(const EntityDefinition& item) {
-  types_.enter(&item);
+  types_.enter(types_.declared_name(item.qualified_name));
   const auto name = types_.declared_name(item.qualified_name);
   header_.documentation(item.documentation);
   header_.open("struct " + name + " {");
@@ -53,25 +53,27 @@ void CppEmitter::emit_fields(const EntityDefinition& item) {
   header_.line("bool operator==(const " + name + "&) const = default;");
   header_.close("};");
   emit_packing(item);
-  types_.enter(nullptr);
+  types_.enter({});
 }
 
 void CppEmitter::emit_packing(const EntityDefinition& item) {
   const auto name = types_.declared_name(item.qualified_name);
-  header_.line("rr::Structure rr_pack(" + name + " value);");
-  header_.line("void rr_unpack(const rr::Structure& fields, " + name + "& value);");
+  header_.line("rr::Structure rr_pack(" + name + " rr_value);");
+  header_.line("void rr_unpack(const rr::Structure& rr_fields, " + name + "& rr_value);");
   header_.gap();
-  source_.open("rr::Structure rr_pack([[maybe_unused]] " + name + " value) {");
-  source_.line("rr::FieldPacker fields(" + name + "::rr_type, " + std::to_string(item.members.size()) + ");");
+  source_.open("rr::Structure rr_pack([[maybe_unused]] " + name + " rr_value) {");
+  source_.line("rr::FieldPacker rr_fields(" + name + "::rr_type, " + std::to_string(item.members.size()) + ");");
   for (const auto& field : item.members)
-    source_.line("fields.add(\"" + field.name + "\", " + moved(field.type, "value." + types_.member_name(field.name)) +
-                 ");");
-  source_.line("return fields.take();");
+    source_.line("rr_fields.add(\"" + field.name + "\", " +
+                 moved(field.type, "rr_value." + types_.member_name(field.name)) + ");");
+  source_.line("return rr_fields.take();");
   source_.close();
   source_.gap();
-  source_.open("void rr_unpack([[maybe_unused]] const rr::Structure& fields, [[maybe_unused]] " + name + "& value) {");
+  source_.open("void rr_unpack([[maybe_unused]] const rr::Structure& rr_fields, [[maybe_unused]] " + name +
+               "& rr_value) {");
   for (const auto& field : item.members)
-    source_.line("rr::unpack_field(fields, \"" + field.name + "\", value." + types_.member_name(field.name) + ");");
+    source_.line("rr::unpack_field(rr_fields, \"" + field.name + "\", rr_value." + types_.member_name(field.name) +
+                 ");");
   source_.close();
   source_.gap();
 }
