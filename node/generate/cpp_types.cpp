@@ -5,6 +5,7 @@
 #include "core/robdef/model/names.hpp"
 #include "core/types/multidim.hpp"
 #include "node/generate/constant_literal.hpp"
+#include "node/generate/cpp_taken_names.hpp"
 #include "node/generate/source_writer.hpp"
 
 namespace rrgate {
@@ -23,10 +24,8 @@ constexpr std::string_view words[] = {
     "sizeof", "static", "static_assert", "static_cast", "struct", "switch", "template", "this", "thread_local", "throw",
     "true", "try", "typedef", "typeid", "typename", "union", "unsigned", "using", "virtual", "void", "volatile",
     "wchar_t", "while", "xor", "xor_eq",
-    // macros of standard headers, and the two namespaces that generated code names
-    "assert", "BUFSIZ", "CLOCKS_PER_SEC", "EDOM", "EILSEQ", "EOF", "ERANGE", "errno", "EXIT_FAILURE", "EXIT_SUCCESS",
-    "HUGE_VAL", "INFINITY", "linux", "major", "makedev", "MB_CUR_MAX", "minor", "NAN", "NULL", "offsetof", "RAND_MAX",
-    "rr", "SEEK_CUR", "SEEK_END", "SEEK_SET", "std", "stderr", "stdin", "stdout", "unix"};
+    // the two namespaces that generated code names, and macros of headers that it does not include by itself
+    "rr", "std", "major", "makedev", "minor", "stderr", "stdin", "stdout"};
 
 /// [n] is a std::array up to this many items: it lies where the value lies, which may be the stack.
 constexpr std::int32_t max_array_items = 1024;
@@ -53,7 +52,7 @@ std::vector<std::string> segments_of(std::string_view service, Convert convert) 
 }  // namespace
 
 std::string cpp_word(std::string_view name) {
-  const bool is_taken = std::find(std::begin(words), std::end(words), name) != std::end(words);
+  const bool is_taken = is_macro(name) || std::find(std::begin(words), std::end(words), name) != std::end(words);
   return std::string(name) + (is_taken ? "_" : "");
 }
 
