@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Writes cpp_macros.inc: names that the headers of generated C++ take.
+"""Writes cpp_macros.inc and cpp_globals.inc: names that the headers of generated C++ take.
 
 Run by hand, with g++ and the headers of the C library on Linux: python3 node/generate/cpp_taken_names.py
 """
 
+import os
 import pathlib
 import re
 import subprocess
@@ -14,16 +15,33 @@ ROOT = HERE.parent.parent
 COMPILE = ["g++", "-std=gnu++20", f"-I{ROOT}/include", f"-I{ROOT}", "-x", "c++", "-"]
 INCLUDES = '#include "rrgate/client.hpp"\n#include "rrgate/device.hpp"\n'
 NAME = re.compile(r"[A-Za-z](\w*[A-Za-z0-9])?", re.ASCII)  # as the language of definitions has them
-# Left out are names that no definition is expected to have: macros of Boost, and numbers of system calls.
+# Left out are names that no definition is expected to have: macros of Boost, numbers of system calls, and services
+# whose first word has more than small letters.
 LEFT_OUT = ("BOOST_", "SYS_")
+FIRST_WORD = re.compile(r"[a-z]+")
+
+
+def run(*options: str, source: str, check: bool = True) -> subprocess.CompletedProcess:
+    environment = {**os.environ, "LC_ALL": "C"}  # for the text of errors
+    return subprocess.run(
+        [*COMPILE, *options], input=source, stdout=subprocess.PIPE, stderr=None if check else subprocess.PIPE,
+        text=True, check=check, env=environment
+    )
 
 
 def macros() -> set[str]:
     """All but those that are defined as themselves, which replace nothing."""
-    command = [*COMPILE, "-E", "-dM"]
-    text = subprocess.run(command, input=INCLUDES, stdout=subprocess.PIPE, text=True, check=True).stdout
-    found = re.findall(r"^#define (\w+)(?:\([^)]*\))? ?(.*)$", text, re.MULTILINE)
-    return {name for name, value in found if NAME.fullmatch(name) and value != name and not name.startswith(LEFT_OUT)}
+    found = re.findall(r"^#define (\w+)(?:\([^)]*\))? ?(.*)$", run("-E", "-dM", source=INCLUDES).stdout, re.MULTILINE)
+    return {name for name, text in found if NAME.fullmatch(name) and text != name and not name.startswith(LEFT_OUT)}
+
+
+def global_names(taken: set[str]) -> set[str]:
+    """Functions, variables and types: the compiler refuses a namespace of the same name."""
+    words = set(re.findall(r"\w+", run("-E", "-P", source=INCLUDES).stdout, re.ASCII))
+    names = {word for word in words - taken if FIRST_WORD.fullmatch(word)}
+    tried = INCLUDES + "".join(f"namespace {name} {{}}\n" for name in sorted(names))
+    errors = run("-fsyntax-only", "-fmax-errors=0", source=tried, check=False).stderr
+    return names & set(re.findall(r"error: 'namespace (\w+) { }' redeclared", errors))
 
 
 def write(file: str, names: set[str]) -> None:
@@ -32,4 +50,6 @@ def write(file: str, names: set[str]) -> None:
 
 
 if __name__ == "__main__":
-    write("cpp_macros.inc", macros())
+    all_macros = macros()
+    write("cpp_macros.inc", all_macros)
+    write("cpp_globals.inc", global_names(all_macros))

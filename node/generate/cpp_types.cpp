@@ -57,7 +57,9 @@ std::string cpp_word(std::string_view name) {
 }
 
 std::string cpp_namespace(std::string_view service) {
-  return joined(segments_of(service, cpp_word), "::");
+  auto segments = segments_of(service, cpp_word);
+  if (is_global(segments.front())) segments.front() += '_';
+  return joined(segments, "::");
 }
 
 std::string cpp_file_name(std::string_view service) {

@@ -11,7 +11,7 @@ namespace rrgate {
 
 /// With a '_' behind words of C++ and macros of its library.
 std::string cpp_word(std::string_view name);
-/// "com::example::robot".
+/// "com::example::robot"; a first word that is one of the C library gets a '_', too.
 std::string cpp_namespace(std::string_view service);
 /// "com__example__robot".
 std::string cpp_file_name(std::string_view service);

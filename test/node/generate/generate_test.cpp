@@ -116,6 +116,13 @@ TEST_CASE("generate ts: constants of a definition are written once, however many
   CHECK(types_of(200).size() < 3 * types_of(100).size());
 }
 
+TEST_CASE("generate cpp: a service whose name begins like a function of the C library") {
+  const Folder folder;
+  const auto file = folder.write("words.robdef", "service exp.log\nstdver 0.10\nobject exp\nend\n");
+  CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_ok);
+  CHECK_THAT(folder.read("exp__log.hpp"), Contains("\nnamespace exp_::log {\n"));
+}
+
 TEST_CASE("generate: mistakes") {
   const Folder folder;
   const auto bad = folder.write("bad.robdef", "service a\nstdver 0.10\nimport b\n");
