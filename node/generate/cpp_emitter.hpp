@@ -62,6 +62,8 @@ class CppEmitter {
   std::string arguments(const MemberDefinition& member) const;
   static bool is_small(const TypeDefinition& type);  ///< numbers and enums
   static std::string moved(const TypeDefinition& type, const std::string& name);
+  /// Without the container that compat mode takes: a memory is an array.
+  static TypeDefinition memory_type(const MemberDefinition& member);
   static std::string direction(const MemberDefinition& member);
   static std::string index_parameter(const TypeDefinition& objref);
   /// What hands the index of an objref on: ", index" as a string; empty without one.

@@ -38,6 +38,13 @@ bool has_name(const ServiceDefinition& definition, std::string_view name) {
          std::any_of(constants.begin(), constants.end(), [&](const auto& item) { return item.name == name; });
 }
 
+/// "varvalue[]" of compat mode is any value.
+TypeDefinition as_held(TypeDefinition type) {
+  if (type.type == DataType::varvalue_t || type.type == DataType::varobject_t || type.type == DataType::object_t)
+    type.array = ArrayKind::none;
+  return type;
+}
+
 template <class Convert>
 std::vector<std::string> segments_of(std::string_view service, Convert convert) {
   std::vector<std::string> segments;
@@ -110,7 +117,8 @@ std::string CppTypes::name(std::string_view qualified_name, std::string_view suf
   return "::" + cpp_namespace(service) + "::" + declared;
 }
 
-std::string CppTypes::value(const TypeDefinition& type) const {
+std::string CppTypes::value(const TypeDefinition& given) const {
+  const auto type = as_held(given);
   const auto item = scalar(type);
   std::string array = item;
   if (is_multidim(type)) {
@@ -169,7 +177,8 @@ std::string CppTypes::field(const TypeDefinition& type, std::string_view name) c
   return value(type) + ' ' + std::string(name) + default_value(type);
 }
 
-std::string CppTypes::default_value(const TypeDefinition& type) const {
+std::string CppTypes::default_value(const TypeDefinition& given) const {
+  const auto type = as_held(given);
   if (type.container != ContainerKind::none) return " = {}";
   if (type.array == ArrayKind::none) {
     if (type.type == DataType::bool_t) return " = false";

@@ -222,6 +222,12 @@ std::string CppEmitter::moved(const TypeDefinition& type, const std::string& nam
   return is_small(type) ? name : "std::move(" + name + ")";
 }
 
+TypeDefinition CppEmitter::memory_type(const MemberDefinition& member) {
+  auto type = member.type;
+  type.container = ContainerKind::none;
+  return type;
+}
+
 std::string CppEmitter::direction(const MemberDefinition& member) {
   if (member.direction() == MemberDirection::both) return {};
   return member.direction() == MemberDirection::readonly ? ", rr::readonly" : ", rr::writeonly";

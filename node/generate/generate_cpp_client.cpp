@@ -69,7 +69,7 @@ std::string CppEmitter::handle_type(const std::string& prefix, const MemberDefin
     case MemberKind::pipe:
       return of_value("Pipe");
     case MemberKind::memory:
-      return of_value("Memory");
+      return prefix + "Memory<" + types_.value(memory_type(member)) + direction(member) + '>';
     case MemberKind::event:
     case MemberKind::callback: {
       std::vector<std::string> arguments;

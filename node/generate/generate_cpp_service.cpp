@@ -104,7 +104,7 @@ void CppEmitter::emit_service_member(const EntityDefinition& item, const MemberD
           "rr_ask<" + type + ">(rr_client, \"" + member.name + "\", std::move(rr_done)" + arguments(member) + ");");
     }
     case MemberKind::memory: {
-      auto scalar = member.type;
+      auto scalar = memory_type(member);
       scalar.array = ArrayKind::none;
       return emit_virtual("std::shared_ptr<rr::MemoryBuffer<" + types_.value(scalar) + ">> get_" + member.name + "()",
                           " = 0;");

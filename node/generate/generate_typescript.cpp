@@ -80,6 +80,10 @@ std::string fields_text(const std::map<std::string, std::string>& types) {
   return fields.empty() ? "{}" : "{ " + joined(fields, "; ") + " }";
 }
 
+std::string array_of(const std::string& item) {
+  return (item.find('|') == std::string::npos ? item : '(' + item + ')') + "[]";
+}
+
 /// Values that the client receives, or those that it may send, which are more.
 enum class Way { received, sent };
 
@@ -365,7 +369,7 @@ std::string TypeScriptEmitter::type_text(const TypeDefinition& type, Way way) {
   const auto item = item_text(type, way);
   switch (type.container) {
     case ContainerKind::list:
-      return (item.find('|') == std::string::npos ? item : '(' + item + ')') + "[] | null";
+      return array_of(item) + " | null";
     case ContainerKind::map_int32:
       return "Map<number, " + item + "> | null";
     case ContainerKind::map_string:
@@ -424,7 +428,7 @@ std::string TypeScriptEmitter::array_text(const TypeDefinition& type, Way way) {
   if (const auto found = typed_arrays.find(type.type); found != typed_arrays.end()) return found->second;
   if (type.type == DataType::cdouble_t) return from_client("Complex") + "<Float64Array>";
   if (type.type == DataType::csingle_t) return from_client("Complex") + "<Float32Array>";
-  return scalar_text(type, way) + "[]";
+  return array_of(scalar_text(type, way));
 }
 
 std::string TypeScriptEmitter::both_ways(const TypeDefinition& type) {

@@ -77,16 +77,19 @@ TEST_CASE("generate cpp: a header and a source for each file, none for imports")
 
 TEST_CASE("generate: what only compat mode takes becomes code all the same") {
   const Folder folder;
-  const auto file = folder.write("old.robdef",
-                                 "service test.class\noption version 0.9\noption constant int16 A.B 1\nobject X\n"
-                                 "    function void f(int32 5, varobject in)\nend object\n");
+  const auto file =
+      folder.write("old.robdef",
+                   "service test.class\noption version 0.9\noption constant int16 A.B 1\nobject X\n"
+                   "    function void f(int32 5, varobject in)\n    property varvalue[] any\nend object\n");
   CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_failed);
   CHECK(run_command("generate", {"cpp", "--compat", file, "-o", folder.path("")}).code == exit_ok);
   const auto header = folder.read("test__class.hpp");
   CHECK_THAT(header, Contains("namespace test::class_ {") && Contains("inline constexpr std::int16_t A_B = 1;") &&
-                         Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;"));
+                         Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;") &&
+                         Contains("virtual rr::Value get_any() = 0;"));
   CHECK_THAT(run_command("generate", {"ts", "--compat", file}).output,
              Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;") &&
+                 Contains("any: PropertyMember<RrValue[], (RrValue | ExactValue)[]>;") &&
                  Contains("export type test_class_Constants = { readonly A_B: number };") &&
                  Contains("readonly $: ObjectInfo<X, test_class_Constants>;"));
 }
