@@ -83,6 +83,7 @@ void GatewayService::add_members() {
   service_->property("subscriptions").get([this] { return list_subscriptions(); });
   service_->property("locks").get([this] { return list_locks(); });
   add_leases();
+  service_->on_client_connected([this](rr::ClientId) { show_statistics(); });  // made for clients alone
   service_->function("find_device", [this](const std::string& wanted) {
     const auto* device = gateway_.devices().find(wanted);
     if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quote(wanted)));
@@ -155,6 +156,10 @@ void GatewayService::look_at_devices() {
     if (!known || known.mapped() != device->state()) service_->fire("device_changed", describe(*device));
   }
   for (const auto& [device_name, state] : before) service_->fire("device_removed", device_name);
+  if (node_.client_count() > 0) show_statistics();
+}
+
+void GatewayService::show_statistics() {
   service_->set_wire("statistics", list_statistics());
 }
 

@@ -36,6 +36,7 @@ class GatewayService {
   /// Tells its clients what has become of the devices; leases are told of from then on.
   void look_at_devices();
   void add_members();
+  void show_statistics();
   rr::Value describe(const Device& device) const;
   rr::Value list_devices() const;
   rr::Value list_statistics() const;

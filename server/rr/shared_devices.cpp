@@ -103,7 +103,7 @@ void SharedDevices::offer_again() {
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {
   own_service_ = std::make_shared<SharedService>(std::move(device), service, std::vector<ServiceBoard*>{&node_});
-  own_service_->start(std::chrono::milliseconds(0));
+  own_service_->start(config_.timeouts.unused_session);
 }
 
 void SharedDevices::stop() {
@@ -120,12 +120,14 @@ void SharedDevices::renew_judges() {
 }
 
 bool SharedDevices::is_ready() const {
-  return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
+  return (!own_service_ || own_service_->has_tried()) &&
+         std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
 }
 
 void SharedDevices::wake(const std::function<bool(const Device&)>& wanted) {
   for (const auto& [key, device] : devices_)
     if (wanted(*key)) device->wake();
+  if (own_service_ && wanted(*own_service_->device())) own_service_->upstream()->wake();
 }
 
 SharedDevice* SharedDevices::find(const Device& device) const {

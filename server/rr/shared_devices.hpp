@@ -56,7 +56,7 @@ class SharedDevices {
   void renew_judges();
 
   bool is_ready() const;
-  /// Of all devices that are `wanted`.
+  /// Of all devices that are `wanted`, and of the gateway itself, which is one here.
   void wake(const std::function<bool(const Device&)>& wanted);
   /// Null where the device is not shared.
   SharedDevice* find(const Device& device) const;

@@ -93,13 +93,16 @@ def test_the_index_tells_of_shared_services(node, site, way):
 
 def test_the_gateway_is_a_service(node, site, tmp_path):
     gateway, port, _ = site
+    gateway.wait_until(lambda: "session rests device=gateway service=gateway" in (tmp_path / "gateway.log").read_text())
+    client = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
     root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=lab.gateway&service=gateway")
+    (newest,) = root.statistics.PeekInValue()[0]
+    assert newest.device == "interop" and newest.messages_to_device > 0, "not those of when the gateway began"
     devices = root.devices
     assert [(each.name, each.state, each.mode) for each in devices] == [("interop", "online", "shared")]
     assert root.find_device("interop").node_name == "interop.service"
     with pytest.raises(RR.KeyNotFoundException):
         root.find_device("nothing")
-    client = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
     wire_news(client.state.Connect())
     client.publish_state([1.0])
     statistics = News()
