@@ -64,7 +64,6 @@ void SharedClient::review() {
 }
 
 bool SharedClient::handle_event(rr::Now) {
-  if (is_waiting_ && !is_closed()) return false;
   const auto event = session_.poll_event();
   if (!event) return false;
   std::visit([&](const auto& happened) { handle(happened); }, *event);
@@ -84,18 +83,6 @@ void SharedClient::handle(const rr::ClientConnected& connected) {
   service_->add(*this);
   home_ = login_ ? login_ : service_->upstream();
   home_->add(*this);
-  if (home_->is_open() || home_->has_tried()) return;
-  is_waiting_ = true;
-  const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
-  asio::co_spawn(executor(), wait_until_open(self, home_), asio::detached);
-}
-
-/// What the client asks for would fail, though the device is there: its session has rested until now.
-rr::awaitable<void> SharedClient::wait_until_open(std::shared_ptr<SharedClient> self,
-                                                  std::shared_ptr<Upstream> upstream) {
-  (void)co_await upstream->opened();  // where the device is away, each request hears so
-  self->is_waiting_ = false;
-  if (!self->is_closed()) self->settle();
 }
 
 void SharedClient::handle(const rr::ClientGone&) {

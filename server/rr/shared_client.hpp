@@ -132,7 +132,6 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
                                               std::shared_ptr<SharedService> service, rr::LoginRequested login);
   static rr::awaitable<void> answer_when_open(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> upstream,
                                               rr::LoginId login, rr::AuthenticatedUser user);
-  static rr::awaitable<void> wait_until_open(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> upstream);
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
   void leave_login();
@@ -150,7 +149,6 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   LockRights rights_;
   std::string key_;
   std::string end_reason_;
-  bool is_waiting_ = false;  ///< for the session with the device, which this client has woken
   bool is_behind_ = false;
   bool was_refused_ = false;  ///< a wire's value, and it is in the log
   bool was_behind_ = false;   ///< and it is in the log

@@ -1,8 +1,6 @@
 // Clients of a shared service: when there is a session with the device, whose it is, and who hears what.
 #include "server/rr/shared_client.hpp"
 
-#include <algorithm>
-
 #include "test/server/rr/shared_room.hpp"
 
 using namespace rrgate;
@@ -54,58 +52,6 @@ TEST_CASE("the first client has the session with the device opened, others share
   CHECK(room.run_until([&] { return room.upstream()->is_resting(); }));
   CHECK(room.left == 2);
   CHECK(room.service->clients().empty());
-}
-
-TEST_CASE("what the first client asks for at once waits for the session that has rested") {
-  SharedRoom room;
-  room.device.service->set_wire("level", rr::Value(1.5));
-  const auto client = room.come().value();
-  REQUIRE_FALSE(room.upstream()->is_open());
-  std::vector<std::string> answers;
-  const auto note = [&](const std::string& what) {
-    return [&answers, what](const rr::Result<rr::Value>& result) {
-      answers.push_back(what + (result ? "" : ": " + result.error().message));
-    };
-  };
-  const std::vector<rr::Value> none;
-  client->peek_in("bench", "level", note("peek"));
-  client->get("bench", "number", note("get"));
-  client->call("bench", "stop", none, note("call"));
-  client->connect_wire(
-      "bench", "level", [](const rr::Value&, rr::TimeSpec) {}, note("connect"));
-  REQUIRE(room.run_until([&] { return answers.size() == 4; }));
-  std::sort(answers.begin(), answers.end());
-  CHECK(answers == std::vector<std::string>{"call", "connect", "get", "peek"});
-  CHECK(room.device.commands == std::vector<std::string>{"stop"});
-}
-
-TEST_CASE("where the session that has rested can't be opened again, what the client asks for fails") {
-  SharedRoom room;
-  room.bench.node.stop();
-  const auto client = room.come().value();
-  const auto failed = room.answer([&](auto done) { client->get("bench", "number", done); });
-  REQUIRE_FALSE(failed.has_value());
-  CHECK(failed.error().code == rr::ErrorCode::connection_error);
-  CHECK_THAT(failed.error().message, Catch::Contains("connection_lost: device 'device'"));
-  CHECK(room.service->upstream()->has_tried());
-  client->disconnect();
-  CHECK(room.run_until([&] { return room.left == 1; }));
-}
-
-TEST_CASE("a client that goes while the session is opened for it leaves nothing behind") {
-  SharedRoom room;
-  std::shared_ptr<SharedClient> came;
-  const auto client = room.come({}, nullptr, &came).value();
-  REQUIRE_FALSE(room.upstream()->is_open());
-  std::optional<rr::Result<rr::Value>> answer;
-  client->call("bench", "stop", {}, [&](rr::Result<rr::Value> result) { answer = std::move(result); });
-  client->close(rr::make_error(rr::ErrorCode::connection_error, "gone"));
-  REQUIRE(room.run_until([&] { return room.left == 1; }));
-  came.reset();
-  CHECK(room.run_until([&] { return room.upstream()->is_resting(); }));
-  CHECK(room.service->clients().empty());
-  CHECK(room.device.commands.empty());
-  CHECK(answer.has_value());
 }
 
 TEST_CASE("a login that the device refuses leaves nothing behind") {
