@@ -119,7 +119,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   bool is_attempting() const { return is_attempting_; }  ///< it is being opened
   /// Whether it stays open though none of its own clients uses it.
   void hold(bool is_held);
-  /// Has it opened again where it rests.
+  /// A client is about to come: opened again where it rests, and open for the whole time without clients from now on.
   void wake();
   /// The device answers again: one that waits for its next attempt makes it now.
   void retry_now();

@@ -232,6 +232,7 @@ rr::awaitable<void> Upstream::rest() {
 
 void Upstream::wake() {
   is_wanted_ = true;
+  if (is_watched_) wake_.cancel();  // it does not rest just when the client comes
   if (!is_resting_) return;
   is_resting_ = false;
   is_waking_ = true;

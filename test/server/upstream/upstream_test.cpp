@@ -726,6 +726,22 @@ TEST_CASE("a client that is gone is not asked with all others, and the device ha
   CHECK((heard && !*heard));
 }
 
+TEST_CASE("a session that a client is about to use has its time without clients from then on") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->wake();
+  bench.upstream->rest_unused(1s);
+  bench.keep_open({10s, 20s, 10s});
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_open(); }));
+  const auto end = std::chrono::steady_clock::now() + 1500ms;
+  REQUIRE(bench.run_until([&] {
+    bench.upstream->wake();
+    return bench.upstream->is_resting() || std::chrono::steady_clock::now() > end;
+  }));
+  CHECK_FALSE(bench.upstream->is_resting());
+  CHECK(bench.run_until([&] { return bench.upstream->is_resting(); }));
+}
+
 TEST_CASE("a session that is held does not rest until it is let go") {
   Counting device;
   UpstreamBench bench(device.service);
