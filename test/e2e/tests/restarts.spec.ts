@@ -121,7 +121,8 @@ class Part {
 
   constructor(words: readonly string[], environment: Readonly<Record<string, string>>) {
     this.#program = new Program(words[0] ?? "", words.slice(1), environment);
-    this.#ports = words.flatMap((word, i) => (words[i - 1] === "--port" ? [Number(word)] : []));
+    // Of a range, as the fleet's, the first port stands for all.
+    this.#ports = words.flatMap((word, i) => (words[i - 1] === "--port" ? [Number.parseInt(word)] : []));
   }
 
   start(): void {

@@ -117,6 +117,11 @@ export function parseBoard(text: string): Board {
   return readBoard(json);
 }
 
+/** It could not be read again. */
+export function isTooLong(board: Board): boolean {
+  return JSON.stringify(writeBoard(board)).length > MOST_TEXT;
+}
+
 /** The board that this browser keeps for a page; null where there is none that can be read. */
 export function recallBoard(key: string, storage: Pick<Storage, "getItem"> = localStorage): Board | null {
   try {

@@ -19,6 +19,7 @@ import { saveFile } from "../ui/save_file";
 import { Silence } from "../ui/silence";
 import { Definitions, scopeOf } from "../values/definitions";
 import {
+  isTooLong,
   keepBoard,
   makeId,
   MOST_PANELS,
@@ -95,6 +96,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
   const here: Board = { ...board, panels: spread(board.panels, board.columns, columns), columns };
   const setBoard = (next: Board): void => {
     if (sameBoard(board, next) || sameBoard(here, next)) return;
+    if (isTooLong(next)) return setTrouble(t("The board would be too large to be kept, with what its files have."));
     undo.forget();
     writeDown(next);
   };

@@ -19,6 +19,8 @@ const german: Readonly<Record<string, string>> = {
   "The board is as at first.": "Die Tafel ist wie am Anfang.",
   "The board is that of the file.": "Die Tafel ist die der Datei.",
   "Emptied for another service: {0}": "Für einen anderen Dienst geleert: {0}",
+  "The board would be too large to be kept, with what its files have.":
+    "Die Tafel würde mit dem Inhalt ihrer Dateien zu groß, um aufgehoben zu werden.",
   "A board has at most {0} panels.": "Eine Tafel hat höchstens {0} Felder.",
   "Removed: {0}": "Entfernt: {0}",
   Undo: "Rückgängig",

@@ -55,23 +55,26 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
     };
   }, []);
 
-  const { carried, frames, points } = useMemo(() => {
+  const { carried, frames, points, positions } = useMemo(() => {
     const points = pointsIn(look.value);
     const positions = readState(look.value)?.positions;
     return {
+      positions,
       carried: positions?.length ? chains.map((chain) => ({ name: chain.name, poses: posesOf(chain, positions) })) : [],
       frames: points ? [] : framesIn(look.value), // a header's pose is the sensor's, and a cloud may have as many as points
       points,
     };
   }, [look.value, chains]);
+  // A robot whose joints are not known is not where its model is at zero.
+  const posed = joints.length <= (positions?.length ?? 0) ? model : null;
   const { bodies, bones, links } = useMemo(
-    () => placed(model, anglesOf(joints, readState(look.value)?.positions)),
-    [look.value, joints, model],
+    () => placed(posed, anglesOf(joints, positions)),
+    [positions, joints, posed],
   );
   const tips = carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose })));
   useEffect(() => {
     const chains = carried.map(({ poses }) => poses);
-    if (model) picture.current?.show(bones, [...tips, ...frames], bodies);
+    if (posed) picture.current?.show(bones, [...tips, ...frames], bodies);
     else picture.current?.show(chains, frames, []);
   }, [carried, frames, bodies]);
   useEffect(() => picture.current?.showPoints(points ?? NO_POINTS), [points]);
