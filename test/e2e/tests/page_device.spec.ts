@@ -45,6 +45,7 @@ test("the camera of a page that is a device is a pipe of pictures, which any <im
   await page.goto(url);
   await page.getByRole("button").click();
   await expect(page.locator("output")).toHaveText('device "phone"');
+  await expect.poll(devices).toMatchObject([{ name: "phone", state: "online" }]);
   const stop = new AbortController();
   const pictures = await fetch(`${member("frames")}?as=mjpeg`, { signal: stop.signal });
   expect(pictures.headers.get("content-type")).toContain("multipart/x-mixed-replace");
