@@ -15,6 +15,7 @@ import type { Link } from "../robot/link";
 import type { Remote } from "../robot/remote";
 import type { StopCall } from "../robot/stop";
 import { Failure } from "../ui/failure";
+import { FileInput } from "../ui/file_input";
 import { saveFile } from "../ui/save_file";
 import { Silence } from "../ui/silence";
 import { Definitions, scopeOf } from "../values/definitions";
@@ -346,17 +347,7 @@ function BoardTools({ board, name, arranging, isOpen, setArranging, add, take, r
           </button>
         </>
       )}
-      <input
-        ref={file}
-        type="file"
-        accept=".json,application/json"
-        hidden
-        aria-label={t("Board file")}
-        onChange={(event) => {
-          open(event.currentTarget.files?.[0]);
-          event.currentTarget.value = "";
-        }}
-      />
+      <FileInput input={file} accept=".json,application/json" label={t("Board file")} open={open} />
     </div>
   );
 }

@@ -8,6 +8,7 @@ import { untilDone } from "../live/pause";
 import { explain } from "../robot/remote";
 import type { Member, Remote } from "../robot/remote";
 import { Failure } from "../ui/failure";
+import { FileInput } from "../ui/file_input";
 import { compose, ORIGIN } from "../values/frames";
 import type { Frame, Pose } from "../values/frames";
 import { posesOfLinks, readUrdf } from "../values/urdf";
@@ -95,17 +96,7 @@ export function ModelTools({ members, settings, change }: Pick<PanelProps, "memb
       <button class="button button-quiet" type="button" onClick={() => input.current?.click()}>
         {t("Open URDF")}
       </button>
-      <input
-        ref={input}
-        type="file"
-        accept=".urdf,.xml"
-        hidden
-        aria-label={t("URDF file")}
-        onChange={(event) => {
-          open(event.currentTarget.files?.[0]);
-          event.currentTarget.value = "";
-        }}
-      />
+      <FileInput input={input} accept=".urdf,.xml" label={t("URDF file")} open={open} />
       <Failure text={failure} />
     </div>
   );
