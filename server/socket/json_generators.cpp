@@ -74,7 +74,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
     rr::add_key(out, "done") = true;
     co_return out;
   }
-  auto json = co_await json_of(*target, value, making_);
+  auto json = co_await json_of(*target, value, making_.form, making_.workers);
   rr::add_key(out, "value") = std::move(json);
   rr::add_key(out, "done") = false;
   co_return out;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/types/value_size.hpp"
-#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/upstream/lease_table.hpp"
 
@@ -45,20 +43,11 @@ rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, c
                                                    const JsonMaking& how) {
   static const auto none = rr::Json::object();
   const auto* given = request.find("args");
-  const auto& parameters = target.member->parameters;
-  const bool are_apart =
-      std::all_of(parameters.begin(), parameters.end(), [](const auto& each) { return is_apart(each.type); });
   const auto make = [&] {
     return arguments_from_json(given ? *given : none, *target.member, target.types(), how.form);
   };
-  if (!request.is_large() || !are_apart) co_return value_or_throw(make());
+  if (!request.is_large() || !is_apart(target.member->parameters)) co_return value_or_throw(make());
   co_return value_or_throw(co_await how.workers.run(make));
-}
-
-rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const JsonMaking& how) {
-  const auto make = [&] { return to_json(target, value, how.form); };
-  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type)) co_return make();
-  co_return co_await how.workers.run(make);
 }
 
 JsonAnswer describe_target(JsonRequestPtr, TargetPtr target, JsonMaking) {
@@ -71,7 +60,7 @@ JsonAnswer get_value(JsonRequestPtr, TargetPtr target, JsonMaking how) {
   expect_direction(member, rr::MemberDirection::writeonly);
   const auto kind = member.kind == rr::MemberKind::property ? rr::CallKind::property_get : rr::CallKind::peek_in;
   const auto value = co_await target->ask(kind);
-  co_return co_await json_of(*target, value, how);
+  co_return co_await json_of(*target, value, how.form, how.workers);
 }
 
 JsonAnswer set_value(JsonRequestPtr request, TargetPtr target, JsonMaking how) {
@@ -90,7 +79,7 @@ JsonAnswer call_function(JsonRequestPtr request, TargetPtr target, JsonMaking ho
   auto called = target->request(rr::CallKind::function);
   called.arguments = co_await arguments_of(*request, *target, how);
   const auto value = co_await target->client->ask(std::move(called));
-  co_return co_await json_of(*target, value, how);
+  co_return co_await json_of(*target, value, how.form, how.workers);
 }
 
 JsonAnswer get_shape(JsonRequestPtr, TargetPtr target, JsonMaking) {
@@ -106,7 +95,7 @@ JsonAnswer read_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how)
   const auto offset = request->numbers("offset", sizes.size());
   const auto count = request->numbers("count", sizes.size());
   const auto items = co_await read_items(*target, sizes, offset, count);
-  co_return co_await json_of(*target, items, how);
+  co_return co_await json_of(*target, items, how.form, how.workers);
 }
 
 JsonAnswer write_memory(JsonRequestPtr request, TargetPtr target, JsonMaking how) {

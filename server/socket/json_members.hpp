@@ -43,8 +43,6 @@ rr::awaitable<rr::Value> value_of(const JsonRequest& request, const Target& targ
 /// The request's "args", for the target's function.
 rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target,
                                                    const JsonMaking& how);
-/// A value of the target's, of the type of its member.
-rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const JsonMaking& how);
 
 using JsonAnswer = rr::awaitable<rr::OrderedJson>;
 JsonAnswer describe_target(JsonRequestPtr request, TargetPtr target, JsonMaking how);

@@ -23,6 +23,10 @@ namespace {
 
 constexpr const char* circle = "its URL leads back to this gateway";
 
+bool is_configured(const Device& device) {
+  return !device.config().is_found && !device.config().is_served;
+}
+
 struct Reached {
   rr::ConnectionUrl url;
   ProbeResult answer;
@@ -366,8 +370,7 @@ rr::Result<> DeviceRegistry::load_tls() {
 
 void DeviceRegistry::reload_tls(bool is_forced) {
   for (const auto& device : devices_)
-    if (!device->config().is_found && !device->config().is_served)
-      device->reload_tls(is_forced);  // those have theirs together
+    if (is_configured(*device)) device->reload_tls(is_forced);  // others have theirs together
 }
 
 void DeviceRegistry::start() {
@@ -452,10 +455,6 @@ rr::NodeIdentity identity_of(const Device& device) {
   if (const auto& known = device.identity()) return {known->node_id, known->node_name};
   const auto& url = device.config().url;
   return {url.node_id.value_or(rr::NodeId{}), url.node_name};
-}
-
-bool is_configured(const Device& device) {
-  return !device.config().is_found && !device.config().is_served;
 }
 
 /// A client that asks for one that is away gets another way to the same node: not another robot of that name, and

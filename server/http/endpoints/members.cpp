@@ -227,10 +227,7 @@ rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectReq
                                                                  const rr::TypeRegistry& types) {
   if (member.parameters.empty() && request.request().message.body().empty()) co_return std::vector<rr::Value>();
   const auto make = [&](const rr::Json& body) { return arguments_from_json(body, member, types, request.form()); };
-  const auto& parameters = member.parameters;
-  const bool are_apart =
-      std::all_of(parameters.begin(), parameters.end(), [](const auto& each) { return is_apart(each.type); });
-  co_return co_await request.from_body(are_apart, make);
+  co_return co_await request.from_body(is_apart(member.parameters), make);
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {

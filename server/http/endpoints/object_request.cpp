@@ -1,11 +1,13 @@
 #include "server/http/endpoints/object_request.hpp"
-#include "server/http/endpoints/large_json.hpp"
+
+#include <algorithm>
 
 #include "core/session/service_path.hpp"
 #include "core/types/value_size.hpp"
 #include "node/values/exception.hpp"
 #include "server/access/authorization.hpp"
 #include "server/http/endpoints/image_values.hpp"
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/state/http_access.hpp"
 
@@ -88,6 +90,17 @@ unsigned status_of(rr::ErrorCode code) {
 
 bool is_apart(const rr::TypeDefinition& type) {
   return type.name.empty() && type.type != rr::DataType::varvalue_t;
+}
+
+bool is_apart(const std::vector<rr::ParameterDefinition>& parameters) {
+  return std::all_of(parameters.begin(), parameters.end(), [](const auto& each) { return is_apart(each.type); });
+}
+
+rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const rr::JsonForm& form,
+                                       Workers& workers) {
+  const auto make = [&] { return to_json(target, value, form); };
+  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type)) co_return make();
+  co_return co_await workers.run(make);
 }
 
 rr::Result<SessionKey> session_key(GatewayState& gateway, const Request& request, std::string service) {
@@ -198,8 +211,11 @@ rr::Result<rr::Json> ObjectRequest::read_body() const {
 
 rr::awaitable<Response> ObjectRequest::value_response(const Target& target, const rr::Value& value,
                                                       std::string_view name) const {
-  auto json = co_await make_json(target, value, form_, name);
-  co_return co_await value_response(std::move(json));
+  auto json = co_await json_of(target, value, form_, gateway_.workers());
+  if (name.empty()) co_return co_await value_response(std::move(json));
+  auto named = rr::OrderedJson::object();
+  rr::add_key(named, name) = std::move(json);
+  co_return co_await value_response(std::move(named));
 }
 
 rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) const {
@@ -209,19 +225,6 @@ rr::awaitable<Response> ObjectRequest::value_response(rr::OrderedJson json) cons
   auto response = text_response(200, is_cbor ? "application/cbor" : "application/json", std::move(*body));
   response.set("Cache-Control", "no-store");
   co_return response;
-}
-
-rr::awaitable<rr::OrderedJson> ObjectRequest::make_json(const Target& target, const rr::Value& value,
-                                                        const rr::JsonForm& form, std::string_view name) const {
-  const auto make = [&] {
-    auto json = to_json(target, value, form);
-    if (name.empty()) return json;
-    auto named = rr::OrderedJson::object();
-    rr::add_key(named, name) = std::move(json);
-    return named;
-  };
-  if (rr::held_bytes(value) <= large_json_bytes || !is_apart(target.member->type)) co_return make();
-  co_return co_await gateway_.workers().run(make);
 }
 
 rr::awaitable<std::optional<std::string>> ObjectRequest::write_document(rr::OrderedJson json, bool is_cbor) const {

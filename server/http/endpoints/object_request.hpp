@@ -41,6 +41,12 @@ struct Target {
 /// Whether values of the type are read and written without the registry: it grows, on the gateway's thread, when a
 /// client opens an object whose definition comes later. Workers must not look into it.
 bool is_apart(const rr::TypeDefinition& type);
+/// Those of all parameters.
+bool is_apart(const std::vector<rr::ParameterDefinition>& parameters);
+
+/// to_json() of the target, on a worker where the value is large and apart. All are borrowed for the wait.
+rr::awaitable<rr::OrderedJson> json_of(const Target& target, const rr::Value& value, const rr::JsonForm& form,
+                                       Workers& workers);
 
 /// WWW-Authenticate where it is the device that wants a login.
 inline constexpr const char* device_challenge = "Basic realm=\"device\"";
@@ -109,10 +115,6 @@ class ObjectRequest {
   /// wait.
   rr::awaitable<Response> value_response(const Target& target, const rr::Value& value,
                                          std::string_view name = {}) const;
-  /// `value` as JSON of that form, or an object with that alone; made on a worker where it is large. All are borrowed
-  /// for the wait. Throws   those of to_json().
-  rr::awaitable<rr::OrderedJson> make_json(const Target& target, const rr::Value& value, const rr::JsonForm& form,
-                                           std::string_view name = {}) const;
   /// JSON with a line's end, or CBOR; written on a worker where it is large. nullopt: there is no memory left for that.
   rr::awaitable<std::optional<std::string>> write_document(rr::OrderedJson json, bool is_cbor) const;
   Response written_response() const;  ///< 204

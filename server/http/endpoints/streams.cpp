@@ -47,7 +47,7 @@ rr::JsonForm text_form(const ObjectRequest& request) {
 rr::awaitable<std::string> make_line(const ObjectRequest& request, const Target& target, const rr::Value& value,
                                      MemoryBudget::Charge& room) {
   const auto form = text_form(request);
-  auto json = co_await request.make_json(target, value, form);
+  auto json = co_await json_of(target, value, form, request.gateway().workers());
   auto line = co_await request.write_document(std::move(json), false);
   // For so little there was room when the request came.
   if (line && (line->size() <= least_room || room.resize(line->size()))) co_return std::move(*line);
