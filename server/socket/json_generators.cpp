@@ -91,11 +91,11 @@ rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(JsonRequestPtr requ
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::close(JsonRequestPtr request, TargetPtr) {
-  return end_generator(request, rr::CallKind::generator_close);
+  co_return co_await end_generator(std::move(request), rr::CallKind::generator_close);
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::abort(JsonRequestPtr request, TargetPtr) {
-  return end_generator(request, rr::CallKind::generator_abort);
+  co_return co_await end_generator(std::move(request), rr::CallKind::generator_abort);
 }
 
 }  // namespace rrgate

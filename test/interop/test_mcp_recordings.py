@@ -4,7 +4,7 @@ import json
 import pytest
 from mcp import MCPError
 
-from agents import with_agent, with_tokens
+from agents import records, with_agent, with_tokens
 from http_api import ask
 from recordings import API, begin, begin_gateway, create, wait_for  # noqa: F401 (fixtures)
 
@@ -75,9 +75,8 @@ def test_an_agent_reads_what_a_recording_holds(begin_for_agents, modern):
         numbers = said["numbers"][name]
         assert numbers["min"] <= said["first"][name] <= numbers["max"] and numbers["min"] <= numbers["mean"] <= numbers["max"]
     assert distance["from_device"]["numbers"].keys() == {""}
-    audit = [json.loads(line) for line in (gateway.file.parent / "audit.jsonl").read_text().splitlines()]
-    done = [(each["outcome"], each["path"] if "path" in each else None) for each in audit if each["event"] == "recording_read"]
-    assert len(done) == 3 and {outcome for outcome, _ in done} == {"ok"}
+    done = wait_for(lambda: records(gateway.file.parent, "recording_read"), lambda read: len(read) == 3)  # written after the answer
+    assert {each["outcome"] for each in done} == {"ok"}
 
 
 def test_one_that_is_under_way_is_read_as_far_as_it_is_written(begin_for_agents):
