@@ -195,11 +195,13 @@ struct PatientNode {
 
 /// A call that is not waited for.
 struct Pending {
-  std::optional<Result<Value>> result;
+  // The call keeps it as well: it is completed at the latest when its connection goes, which may outlive this.
+  std::shared_ptr<std::optional<Result<Value>>> kept = std::make_shared<std::optional<Result<Value>>>();
+  std::optional<Result<Value>>& result = *kept;
 
   Pending(const RemoteObject& object, const std::string& function, std::vector<Value> arguments) {
     object.connection().asynchronous().call(object.path(), function, arguments,
-                                            [this](Result<Value> completed) { result = std::move(completed); });
+                                            [kept = kept](Result<Value> completed) { *kept = std::move(completed); });
   }
   Result<Value> wait(const RemoteObject& object) {
     REQUIRE(object.connection().run_until([this] { return result.has_value(); }, 10s));
