@@ -34,7 +34,11 @@ asio::awaitable<void> serve(beast::tcp_stream stream, rr::Node& node) {
     http::request<http::string_body> request;
     const auto [failure, size] = co_await http::async_read(stream, buffer, request, await_tuple);
     if (failure) co_return;
-    if (websocket::is_upgrade(request) && request.target().starts_with("/arm")) {
+    const bool is_for_arm = websocket::is_upgrade(request) && request.target().starts_with("/arm");
+    // Browsers open WebSockets for pages of every site, which Origin names; programs send none. This server has no
+    // pages of its own that would need one, so it refuses them all.
+    const bool is_page = request.count(http::field::origin) != 0;
+    if (is_for_arm && !is_page) {
       const std::string url = "rr+ws://" + std::string(request[http::field::host]) + "/arm";
       websocket::stream<beast::tcp_stream> socket(std::move(stream));
       socket.set_option(websocket::stream_base::decorator(
@@ -43,10 +47,12 @@ asio::awaitable<void> serve(beast::tcp_stream stream, rr::Node& node) {
       if (!refused) node.accept(rr::make_beast_stream(std::move(socket)), url);
       co_return;
     }
-    http::response<http::string_body> answer(http::status::ok, request.version());
+    http::response<http::string_body> answer(is_for_arm ? http::status::forbidden : http::status::ok,
+                                             request.version());
     answer.keep_alive(request.keep_alive());
     answer.set(http::field::content_type, "text/plain");
-    answer.body() = "This arm has " + std::to_string(node.client_count()) + " clients.\n";
+    answer.body() = is_for_arm ? "The arm is not for pages.\n"
+                               : "This arm has " + std::to_string(node.client_count()) + " clients.\n";
     answer.prepare_payload();
     const auto [lost, sent] = co_await http::async_write(stream, answer, await_tuple);
     if (lost || !request.keep_alive()) co_return;

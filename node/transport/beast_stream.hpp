@@ -106,7 +106,9 @@ class BeastStream final : public ByteStream {
   bool is_stalled_ = false;
 };
 
-/// Takes over a WebSocket that is open, for Node::accept(). `send_stall`: see ByteStream::write().
+/// Takes over a WebSocket that is open, for Node::accept(). The program must have checked the Origin of its request:
+/// the node does not see it, and browsers open WebSockets for pages of every site. `send_stall`: see
+/// ByteStream::write().
 template <class NextLayer>
 std::unique_ptr<ByteStream> make_beast_stream(boost::beast::websocket::stream<NextLayer> websocket,
                                               std::chrono::milliseconds send_stall = std::chrono::seconds(15)) {

@@ -6,6 +6,7 @@ import urllib.request
 import pytest
 
 from clients import run_program
+from http_api import upgrade_status
 from processes import BUILD, Background
 
 REFERENCE = """
@@ -39,3 +40,10 @@ def test_our_client_does_and_the_server_answers_requests_beside_it(url):
     page = url.split("/arm")[0].replace("rr+ws", "http")
     with urllib.request.urlopen(page, timeout=10) as answer:
         assert answer.read() == b"This arm has 0 clients.\n"
+
+
+def test_pages_of_all_sites_are_refused(url):
+    port = int(url.split("/arm")[0].split(":")[-1])
+    for origin in "https://elsewhere.example", f"http://127.0.0.1:{port}", "null", "":
+        assert upgrade_status(port, "/arm", {"Origin": origin}) == 403, origin
+    assert upgrade_status(port, "/arm") == 101
