@@ -288,6 +288,7 @@ def test_the_compose_files_are_such(names):
         assert not errors, errors
     ports = [port.rsplit(":", 1)[0] for service in whole["services"].values() for port in service.get("ports", [])]
     assert len(ports) == len(set(ports)), "two services have one port"
+    assert all(port.startswith("127.0.0.1:") for port in ports), "the demo has no users, so it is for this machine alone"
     (addresses,) = whole["networks"]["default"]["ipam"]["config"]
     subnet = ipaddress.ip_network(addresses["subnet"])
     handed_out = ipaddress.ip_network(addresses.get("ip_range", addresses["subnet"]))  # to whoever asks for none
