@@ -82,6 +82,12 @@ def test_python_comes_from_a_folder_of_its_own():
     assert commands and found == []
 
 
+def test_containers_are_published_to_this_machine():
+    """What Docker publishes passes the firewall of the host, and the page has no TLS."""
+    published = [port for text in pages().values() for port in re.findall(r"docker run\b[^`]*?\s-p\s+(\S+)", text)]
+    assert len(published) > 3 and [port for port in published if not port.startswith("127.0.0.1:")] == []
+
+
 def test_packages_are_where_the_script_puts_them():
     version = re.search(r"^project\(rrgate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)[1]
     named = [name for block in blocks() if block.language == "sh" for name in re.findall(r"apt install (\S+)", block.text)]
