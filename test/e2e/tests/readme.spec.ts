@@ -30,6 +30,9 @@ test("the README's robot", ({ lab }) => {
   expect(run("README.md", lab)).toMatch(/^-?\d+ mm\n52\n$/);
 });
 
-test("the README of rrgate-client", ({ lab }) => {
+test("the README of rrgate-client, which leaves the robot standing", async ({ lab, request }) => {
   expect(run("wasm-client/README.md", lab)).toMatch(/^-?\d+\n52\n.+\n$/);
+  const state = async (): Promise<unknown> =>
+    (await request.get(`${lab.url}api/v1/devices/create/Create/state`)).json();
+  await expect.poll(state).toMatchObject({ velocity: 0, turn_rate: 0 });
 });
