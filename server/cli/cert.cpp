@@ -171,9 +171,11 @@ rr::Result<CertificateFiles> make_authorities(const CertificateOptions& options)
 void print_authorities(const CertificateFiles& files) {
   for (const auto& file : files)
     if (file.extension() == ".pem") std::cout << file.string() << "\n";
-  std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
-               "are told by\n  export ROBOTRACONTEUR_SSL_CERT_FILE="
-            << fs::absolute(files.front()).string() << "\n";
+  std::cout
+      << "The .key files beside them make certificates that are believed: keep them secret, and off the gateway's "
+         "machine.\nPrograms that shall believe these certificates are told by\n  export "
+         "ROBOTRACONTEUR_SSL_CERT_FILE="
+      << fs::absolute(files.front()).string() << "\n";
 }
 
 rr::Result<CertificateFiles> make_web_certificate(const WebCertificateOptions& options) {

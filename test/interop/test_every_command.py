@@ -77,7 +77,8 @@ def test_init_tells_all_that_it_made(tmp_path):
 
 def test_init_tells_people_the_same(tmp_path):
     said = run("init", tmp_path / "lab")
-    for words in ("tls/node-ca.pem", "tls/web-ca.pem", "The .key files", "user admin, password ", "https://", "Next: put your devices into"):
+    for words in ("tls/node-ca.pem", "tls/web-ca.pem", "The .key files", "keep them secret, and off the gateway's machine",
+                  "user admin, password ", "https://", "Next: put your devices into"):
         assert words in said, words
     assert "node-ca.key" not in said
 
