@@ -46,6 +46,7 @@ nlohmann::ordered_json make_config(const fs::path& folder, const std::string& ce
   config["listen"] = {"0.0.0.0:8443"};
   config["devices"] = nlohmann::ordered_json::array();
   config["tls"]["certificates"] = {{{"cert", "tls/" + certificate + ".pem"}, {"key", "tls/" + certificate + ".key"}}};
+  config["tls"]["required"] = true;
   auto& access = config["access"];
   access["users_file"] = "users";
   access["ticket_key_file"] = ticket_key_name;

@@ -111,6 +111,12 @@ def test_configuration(block, tmp_path):
     assert (done.stdout or done.stderr) and findings == []
 
 
+def test_configurations_take_no_password_in_clear():
+    """Where there are certificates for TLS and users: what check-config warns of, where it finds the files."""
+    configurations = [json.loads(block.text) for block in blocks() if block.language == "json" and '"certificates"' in block.text]
+    assert len(configurations) > 1 and [each["tls"] for each in configurations if not each["tls"].get("required")] == []
+
+
 def test_typescript(tmp_path):
     (tmp_path / "node_modules").mkdir()
     (tmp_path / "node_modules/rrgate-client").symlink_to(ROOT / "wasm-client")

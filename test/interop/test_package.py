@@ -310,6 +310,7 @@ def test_a_folder_to_begin_with(root, tmp_path):
         for given, status in ((password, 200), ("guess", 401)):
             login = {"Authorization": "Basic " + base64.b64encode(f"root:{given}".encode()).decode()}
             assert ask(port, "GET", "/api/v1/devices", headers=login, **trust).status == status
+            assert ask(port, "GET", "/api/v1/devices", headers=login).status == 403  # in clear
     finally:
         gateway.stop()
 

@@ -118,6 +118,15 @@ TEST_CASE("init: the configuration has a key of its own, so that sign-ins outliv
   CHECK_THAT(kept.errors, Catch::Contains("gateway.json: is there already, and says more than where to listen"));
 }
 
+TEST_CASE("init: the configuration deserves no warning") {
+  const test::Folder folder;
+  const auto config = folder.path("gateway.json");
+  REQUIRE(test::run_command("init", {std::filesystem::path(config).parent_path().string()}).code == 0);
+  const auto checked = test::run_command("check-config", {config});
+  CHECK(checked.code == 0);
+  CHECK(checked.errors.empty());
+}
+
 TEST_CASE("passwd: what others have changed while the password was typed stays") {
   /// Types a password, and whatever else happens meanwhile.
   struct Typist : std::streambuf {
