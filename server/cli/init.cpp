@@ -59,6 +59,13 @@ nlohmann::ordered_json make_config(const fs::path& folder, const std::string& ce
   return config;
 }
 
+/// One path for a folder that is named in several ways, as "." and "/etc/rrgate/".
+fs::path full_path(const fs::path& folder) {
+  std::error_code error;
+  auto full = fs::absolute(folder, error).lexically_normal();
+  return full.has_filename() ? full : full.parent_path();
+}
+
 std::vector<fs::path> files_beside(const fs::path& folder) {
   return {folder / "users", folder / ticket_key_name, folder / tls_folder_name};
 }
@@ -127,7 +134,7 @@ void print_text(const Made& made) {
 }
 
 int init(const InitOptions& options) {
-  const fs::path folder = options.folder;
+  const auto folder = full_path(options.folder);
   const auto& user = options.user;
   if (const auto checked = check_name("user name", user); !checked) return usage_error("init", checked.error().message);
 

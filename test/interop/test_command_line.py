@@ -632,6 +632,19 @@ def test_a_folder_that_init_could_not_finish_is_begun_anew(tmp_path):
     assert (folder / "users").exists() and (folder / "tls").exists()  # what it did not make stays
 
 
+@pytest.mark.parametrize("named", ["/etc/rrgate", "/etc/rrgate/", "."])
+def test_init_knows_the_folder_of_the_service_however_it_is_named(tmp_path, named):
+    need("mount-namespaces")
+    (tmp_path / "rrgate").mkdir()
+    script = 'mount --bind "$1" /etc && shift && cd /etc/rrgate && exec "$@"'
+    made = subprocess.run(["unshare", "-m", "--propagation", "private", "sh", "-c", script, "sh", tmp_path, RRGATE, "init", named],
+                          capture_output=True, text=True, timeout=60)
+    assert made.returncode == DONE, made.stderr
+    assert made.stdout.endswith("\nNext: put your devices into /etc/rrgate/gateway.json, then systemctl enable --now rrgate\n")
+    config = json.loads((tmp_path / "rrgate/gateway.json").read_text())
+    assert config["access"]["audit_file"] == "/var/log/rrgate/audit.jsonl"
+
+
 def test_check_config_warns_of_tokens_that_the_service_cannot_write(tmp_path_factory):
     user = "nobody" if os.geteuid() == 0 else getpass.getuser()
     with tempfile.TemporaryDirectory() as name:  # below folders that everybody may enter
