@@ -1,4 +1,4 @@
-import { formatRoute, parseRoute } from "../../web/src/app/router";
+import { formatRoute, parseRoute, splitSteps } from "../../web/src/app/router";
 import { readRequests } from "../../web/src/gateway/access";
 import { readDevices, relayUrl } from "../../web/src/gateway/devices";
 import { mustSignIn, proofOf, readWho } from "../../web/src/gateway/session";
@@ -121,6 +121,11 @@ describe("addresses", () => {
       view: "board",
       board: "e30",
     });
+  });
+
+  it("leads to objects by steps whose keys may have dots", () => {
+    expect(splitSteps("Webcams[0].lens")).toEqual(["Webcams[0]", "lens"]);
+    expect(splitSteps("tools[left.hand].tip")).toEqual(["tools[left.hand]", "tip"]);
   });
 });
 
