@@ -41,6 +41,14 @@ describe("a generator", () => {
     expect(next).toHaveBeenCalledWith(7);
   });
 
+  test("says which input is wrong", async () => {
+    showPanel(GeneratorPanel, robotOf().object, moveOf("speed", "distance"));
+    await settle();
+    await type("1", "far");
+    await press("Run");
+    expect(text()).toContain('distance: "far" is not a number');
+  });
+
   test("that was lost with the connection may still run, also when the device is back", async () => {
     const update = showPanel(GeneratorPanel, robotOf().object, moveOf("speed"));
     await settle();

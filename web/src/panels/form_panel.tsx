@@ -1,22 +1,22 @@
 // Calls, properties to set, values to send: fields from the types, what came back, what was done before, and the same as code.
 // Layer: web/panels.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { Refusal } from "../members/refusal";
 import { PATIENT, useAction } from "../members/row";
 import type { Member } from "../robot/remote";
 import { loaded } from "../ui/loaded";
 import { clockTime, flowing } from "../ui/words";
-import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
+import { draftOf, jsonOf } from "../values/draft";
 import { rowsOf } from "../values/rows";
 import type { CodeProps } from "./code_part";
 import { DraftInput } from "./draft_input";
-import { fitDrafts } from "./form_drafts";
 import type { FormDrafts } from "./form_drafts";
 import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
+import { useDrafts } from "./use_drafts";
 import "./form_panel.css";
 
 const LoadedCode = loaded<CodeProps>(() => import("./code_part"));
@@ -67,26 +67,20 @@ interface MemberFormProps extends PanelProps {
 }
 
 function MemberForm({ object, member, definitions, scope, place, withMore = false }: MemberFormProps) {
-  const inputs = inputsOf(member);
-  const fit = (old: FormDrafts | null): FormDrafts => fitDrafts(old, inputs, definitions, scope);
-  const [form, setForm] = useState(() => fit(null));
-  const { drafts, emptied } = form;
+  const inputs = useMemo(() => inputsOf(member), [member]);
+  const { fields, lost, form, fill } = useDrafts(inputs, definitions, scope);
   const isTouched = useRef(false); // by a person: it stays as it is, whatever the device has
-  const setDrafts = (next: FormDrafts["drafts"], isTyped: boolean): void => {
-    isTouched.current = isTyped;
-    setForm((old) => ({ ...old, drafts: next, emptied: [] }));
+  const touch = (fillIn: () => void): void => {
+    isTouched.current = true;
+    fillIn();
+  };
+  const showRead = (value: unknown): void => {
+    isTouched.current = false;
+    fill({ ...form, drafts: [draftOf(value, member.type, definitions, scope)], emptied: [] });
   };
   const [done, setDone] = useState<readonly Done[]>([]);
   const doing = useAction();
-  useEffect(() => setForm(fit), [member, definitions]); // types may be known only now
-  const values = (): unknown[] =>
-    inputs.map(({ name, type }, i) => {
-      try {
-        return valueOf(drafts[i] ?? makeDraft(type, definitions, scope), type, definitions, scope);
-      } catch (error) {
-        throw new Error(`${name}: ${(error as Error).message}`, { cause: error });
-      }
-    });
+  const values = (): unknown[] => fields.map(({ value }) => value());
   const submit = (event: Event): void => {
     event.preventDefault();
     doing.run(async () => {
@@ -113,41 +107,29 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
   const isReadable = member.kind === "property" && !member.modifiers.includes("writeonly");
   const read = (): void =>
     doing.run(async () => {
-      if (object) setDrafts([draftOf(await object.get(member.name), member.type, definitions, scope)], false);
+      if (object) showRead(await object.get(member.name));
     });
   // What a property is, on each connection, not a 0 that nobody gave it; and never over what was typed in meanwhile.
   useEffect(() => {
     if (!object || !isReadable) return;
     let isWanted = true;
     object.get(member.name).then(
-      (value) => isWanted && !isTouched.current && setDrafts([draftOf(value, member.type, definitions, scope)], false),
+      (value) => isWanted && !isTouched.current && showRead(value),
       () => undefined, // whoever presses Read learns why
     );
     return () => void (isWanted = false);
   }, [object, member, definitions]);
-  const take = (before: FormDrafts): void => {
-    isTouched.current = true;
-    setForm(fit(before));
-  };
-  const isPlain = inputs.length === 0 && !withMore; // beside others of its kind its name says it all
+  const isPlain = fields.length === 0 && !withMore; // beside others of its kind its name says it all
   const word = member.kind === "function" ? t("Call") : member.kind === "property" ? t("Set") : t("Send");
   const [newest] = done;
   return (
     <form class={`member-form ${isPlain ? "is-plain" : ""}`} onSubmit={submit} data-form={member.name}>
-      {inputs.map(({ name, type }, i) => (
+      {fields.map(({ name, type, draft, change }) => (
         <DraftInput
           key={name}
           label={name}
-          type={type}
-          definitions={definitions}
-          scope={scope}
-          draft={drafts[i] ?? makeDraft(type, definitions, scope)}
-          change={(next) =>
-            setDrafts(
-              drafts.map((old, at) => (at === i ? next : old)),
-              true,
-            )
-          }
+          {...{ type, definitions, scope, draft }}
+          change={(next) => touch(() => change(next))}
         />
       ))}
       <div class="row-line">
@@ -181,17 +163,9 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           </tbody>
         </table>
       )}
-      <Refusal
-        failure={
-          doing.failure ??
-          (emptied.length > 0 ? t("Emptied, since its type has changed: {0}", emptied.join(", ")) : null)
-        }
-        isLocked={doing.isLocked}
-        object={object}
-        place={place}
-      />
+      <Refusal failure={doing.failure ?? lost} isLocked={doing.isLocked} object={object} place={place} />
       {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
-      {withMore && done.length > 0 && <History done={done} take={take} />}
+      {withMore && done.length > 0 && <History done={done} take={(before) => touch(() => fill(before))} />}
       {withMore && <Code member={member} values={values} place={place} types={{ definitions, scope }} />}
     </form>
   );
