@@ -1,5 +1,14 @@
 // A board as a text: in an address, in a file, kept by this browser.
-import { packBoard, parseBoard, recallBoard, sameBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import {
+  formatBoard,
+  isTooLong,
+  packBoard,
+  parseBoard,
+  recallBoard,
+  sameBoard,
+  unpackBoard,
+  writeBoard,
+} from "../../web/src/board/board";
 import type { Board } from "../../web/src/board/board";
 import { Keeper } from "../../web/src/board/keeper";
 
@@ -40,6 +49,18 @@ describe("a board", () => {
       ["{", "the file is no JSON"],
     ] as const)
       expect(() => parseBoard(file), file).toThrow(words);
+  });
+
+  test("is too long where the file that is made of it could not be read again", () => {
+    const path = (count: number): Board => ({
+      ...board,
+      panels: board.panels.map((panel) => ({ ...panel, settings: { path: Array(count).fill(0) } })),
+    });
+    const [short, long] = [path(70_000), path(90_000)]; // each number has a line of its own
+    expect(isTooLong(short)).toBe(false);
+    expect(writeBoard(parseBoard(formatBoard(short)))).toEqual(writeBoard(short));
+    expect(isTooLong(long)).toBe(true);
+    expect(() => parseBoard(formatBoard(long))).toThrow("expected at most 1048576");
   });
 
   test("that this browser keeps and cannot read any more is no board", () => {

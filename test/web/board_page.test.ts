@@ -113,5 +113,21 @@ test("no panel is added to a board that could not be read again with it", async 
   await press("Add panel");
   expect(document.querySelectorAll("[data-panel]")).toHaveLength(MOST_PANELS);
   expect(button("Add panel").disabled).toBe(true);
+  expect(text()).toContain("A board has at most 64 panels.");
   expect(recallBoard("d/s")?.panels).toHaveLength(MOST_PANELS);
+});
+
+test("what would make a board too large to be kept is not taken, with the reason, until there is room again", async () => {
+  const filled = { text: "x".repeat(1024 * 1024 - 1000) };
+  showBoard(new Store<LinkState>(online(remoteOf([]))), packed(panelOf({ settings: filled }), panelOf({ x: 3 })));
+  await settle();
+  await vi.waitFor(() => expect(document.querySelectorAll("textarea")).toHaveLength(2));
+  const [, notes] = document.querySelectorAll("textarea") as unknown as HTMLInputElement[];
+  const note = () => recallBoard("d/s")?.panels[1]?.settings;
+  await enter(notes as HTMLInputElement, "y".repeat(1000));
+  expect(text()).toContain("The board would be too large to be kept");
+  expect([notes?.value, note()]).toEqual(["", {}]);
+  await enter(notes as HTMLInputElement, "call Vera");
+  expect(text()).not.toContain("too large");
+  await vi.waitFor(() => expect(note()).toEqual({ text: "call Vera" }));
 });

@@ -117,9 +117,14 @@ export function parseBoard(text: string): Board {
   return readBoard(json);
 }
 
-/** It could not be read again. */
+/** As a file, which people may read. */
+export function formatBoard(board: Board): string {
+  return `${JSON.stringify(writeBoard(board), null, 2)}\n`;
+}
+
+/** Its file could not be read again. */
 export function isTooLong(board: Board): boolean {
-  return JSON.stringify(writeBoard(board)).length > MOST_TEXT;
+  return formatBoard(board).length > MOST_TEXT;
 }
 
 /** The board that this browser keeps for a page; null where there is none that can be read. */

@@ -20,6 +20,7 @@ import { saveFile } from "../ui/save_file";
 import { Silence } from "../ui/silence";
 import { Definitions, scopeOf } from "../values/definitions";
 import {
+  formatBoard,
   isTooLong,
   keepBoard,
   makeId,
@@ -30,7 +31,6 @@ import {
   recallBoard,
   sameBoard,
   unpackBoard,
-  writeBoard,
 } from "./board";
 import type { Board, Panel, PanelKind } from "./board";
 import { Guard } from "./guard";
@@ -100,6 +100,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
     if (isTooLong(next)) return setTrouble(t("The board would be too large to be kept, with what its files have."));
     undo.forget();
     writeDown(next);
+    setTrouble(null);
   };
   const replace = (words: string, next: Board): void => {
     undo.lose(words, board);
@@ -294,7 +295,7 @@ function BoardTools({ board, name, arranging, isOpen, setArranging, add, take, r
     saveFile(
       `${decodeURIComponent(name).replace(/[^\w.-]+/g, "-")}.board.json`,
       "application/json",
-      `${JSON.stringify(writeBoard(board), null, 2)}\n`,
+      formatBoard(board),
     );
   const open = (chosen: File | undefined): void => {
     if (!chosen) return;
@@ -327,15 +328,10 @@ function BoardTools({ board, name, arranging, isOpen, setArranging, add, take, r
               ))}
             </select>
           </label>
-          <button
-            class="button"
-            type="button"
-            disabled={isFull}
-            title={isFull ? t("A board has at most {0} panels.", MOST_PANELS) : undefined}
-            onClick={() => add(kind)}
-          >
+          <button class="button" type="button" disabled={isFull} onClick={() => add(kind)}>
             {t("Add panel")}
           </button>
+          {isFull && <span class="note">{t("A board has at most {0} panels.", MOST_PANELS)}</span>}
           <button class="button button-quiet" type="button" onClick={save}>
             {t("Save file")}
           </button>
