@@ -26,7 +26,7 @@ const JOINT = {
 const INFO = { joint_info: [JOINT] };
 
 /** A robot that is in jog mode, and says so regularly, so many times. */
-const robotOf = (info: () => Promise<unknown>, times = Infinity) =>
+const robotOf = (info: () => Promise<unknown>, times = Infinity, positions = [0.25]) =>
   ({
     path: "Robot",
     controls: new Map(),
@@ -36,7 +36,12 @@ const robotOf = (info: () => Promise<unknown>, times = Infinity) =>
     async *wire(_: string, signal: AbortSignal) {
       for (let said = 0; !signal.aborted; ++said) {
         if (said === times) await new Promise(() => undefined);
-        yield { command_mode: 1, operational_mode: 0, controller_state: 0, joint_position: new Float64Array([0.25]) };
+        yield {
+          command_mode: 1,
+          operational_mode: 0,
+          controller_state: 0,
+          joint_position: new Float64Array(positions),
+        };
         await new Promise((resolve) => setTimeout(resolve, PERIOD_MS));
       }
     },
@@ -133,4 +138,14 @@ describe("what a robot said before an outage", () => {
     expect(text()).toContain("Stale");
     expect(button("Here 1").disabled).toBe(true);
   });
+});
+
+test("a robot without joints has its state and its modes, and nothing to be jogged or moved", async () => {
+  const bare = () => robotOf(() => Promise.resolve({ joint_info: null, chains: null }), Infinity, []);
+  await showPanel(RobotPanel, bare());
+  expect([find(".robot-words").textContent, button("Jog").disabled]).toEqual([expect.stringContaining("jog"), false]);
+  expect(document.querySelectorAll(".jog-button")).toHaveLength(0);
+  clear();
+  await showPanel(TrajectoryPanel, bare());
+  expect([button("Run").disabled, document.querySelector("[role=alert]:not([hidden])")]).toEqual([true, null]);
 });

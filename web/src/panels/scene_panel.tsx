@@ -28,7 +28,8 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
   const usual = choices.find(({ name }) => name === "robot_state") ?? choices[0];
   const name = textIn(settings, "member") || usual?.name || "";
   const look = useFeed(object, feedKindOf(choices.find((each) => each.name === name)), name);
-  const { info, failure: unknown } = useRobotInfo(object, object?.has("robot_info", "property") === true);
+  const isRobot = members.some((each) => each.name === "robot_info" && each.kind === "property");
+  const { info, failure: unknown } = useRobotInfo(object, isRobot);
   const chains = useMemo(() => chainsOf(info), [info]);
   const joints = useMemo(() => jointsOf(info), [info]);
   const { model, failure: noModel } = useModel(object, members, settings);
@@ -66,7 +67,8 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
     };
   }, [look.value, chains]);
   // A robot whose joints are not known is not where its model is at zero.
-  const posed = joints.length <= (positions?.length ?? 0) ? model : null;
+  const isPosed = (info !== undefined || !isRobot) && joints.length <= (positions?.length ?? 0);
+  const posed = isPosed ? model : null;
   const { bodies, bones, links } = useMemo(
     () => placed(posed, anglesOf(joints, positions)),
     [positions, joints, posed],
