@@ -1,7 +1,7 @@
 // What agents do: read from whatever the gateway answers, kept while it is away, asked for only while shown.
 import { agentSessions, readAgentSessions } from "../../web/src/gateway/agent_sessions";
 import type { AgentSession } from "../../web/src/gateway/agent_sessions";
-import { polledPage } from "./polled";
+import { polledPage, restsWhileHidden } from "./polled";
 
 /** As the gateway writes it. */
 const written = {
@@ -123,16 +123,5 @@ describe("a list of sessions of agents", () => {
     list.stop();
   });
 
-  it("is not asked for while the page is hidden, and at once when it is shown", async () => {
-    const list = agentSessions();
-    page.hidden = true;
-    list.start();
-    await vi.advanceTimersByTimeAsync(60_000);
-    expect(asked.length).toBe(1);
-    page.hidden = false;
-    page.look();
-    await vi.advanceTimersByTimeAsync(0);
-    expect(asked.length).toBe(2);
-    list.stop();
-  });
+  restsWhileHidden(page, agentSessions);
 });

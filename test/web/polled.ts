@@ -1,4 +1,9 @@
 // A page that asks a gateway again and again: by a clock that tests set forward, with answers that they give.
+interface Polled {
+  start(): void;
+  stop(): void;
+}
+
 export interface PolledPage {
   /** What each next request gets; with none left, the gateway is away. */
   answers: (Response | Error)[];
@@ -38,4 +43,20 @@ export function polledPage(end = ""): PolledPage {
     vi.unstubAllGlobals();
   });
   return page;
+}
+
+/** A test: `list` asks nothing while the page is hidden. */
+export function restsWhileHidden(page: PolledPage, list: () => Polled): void {
+  it("is not asked for while the page is hidden, and at once when it is shown", async () => {
+    const polled = list();
+    page.hidden = true;
+    polled.start();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(page.asked.length).toBe(1);
+    page.hidden = false;
+    page.look();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(page.asked.length).toBe(2);
+    polled.stop();
+  });
 }

@@ -4,7 +4,7 @@ import type { Polled } from "../../web/src/gateway/polled_list";
 import { readSubscriptions, subscriptionsAt } from "../../web/src/gateway/subscriptions";
 import type { Subscription } from "../../web/src/gateway/subscriptions";
 import { ageText } from "../../web/src/ui/words";
-import { polledPage } from "./polled";
+import { polledPage, restsWhileHidden } from "./polled";
 
 const frames: Subscription = {
   client: "192.0.2.1:5",
@@ -91,18 +91,7 @@ describe("a list of subscriptions", () => {
     list.stop();
   });
 
-  it("is not asked for while the page is hidden, and at once when it is shown", async () => {
-    const list = subscriptionsAt("robot");
-    page.hidden = true;
-    list.start();
-    await vi.advanceTimersByTimeAsync(60_000);
-    expect(asked.length).toBe(1);
-    page.hidden = false;
-    page.look();
-    await vi.advanceTimersByTimeAsync(0);
-    expect(asked.length).toBe(2);
-    list.stop();
-  });
+  restsWhileHidden(page, () => subscriptionsAt("robot"));
 });
 
 it("an age has the digits that matter", () => {

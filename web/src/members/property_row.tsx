@@ -3,23 +3,19 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { placeOf } from "../app/router";
 import { Failure } from "../ui/failure";
 import { useAge } from "../ui/use_age";
 import { formatValue } from "../values/format";
-import { parseInput } from "../values/parse";
-import { Refusal } from "./refusal";
 import { PATIENT, RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
-import { initialText, ValueInput } from "./value_input";
+import { ValueForm } from "./value_form";
 
-export function PropertyRow({ object, member, live, route }: MemberRowProps) {
+export function PropertyRow(props: MemberRowProps) {
+  const { object, member, live } = props;
   const readable = !member.modifiers.includes("writeonly");
   const writable = !member.modifiers.includes("readonly");
   const reading = useAction();
-  const writing = useAction();
   const [shown, setShown] = useState<string | null>(null);
-  const [text, setText] = useState(initialText(member.type));
   const readAt = useRef<number | null>(null);
   const isCurrent = live && reading.failure === null;
   const age = useAge(() => (isCurrent ? null : readAt.current));
@@ -31,12 +27,9 @@ export function PropertyRow({ object, member, live, route }: MemberRowProps) {
   useEffect(() => {
     if (live && readable) read();
   }, [object, live]);
-  const write = (event: Event): void => {
-    event.preventDefault();
-    writing.run(async () => {
-      await object.set(member.name, parseInput(text, member.type), PATIENT);
-      if (readable) read(); // what fails there says nothing of what was set
-    });
+  const write = async (value: unknown): Promise<void> => {
+    await object.set(member.name, value, PATIENT);
+    if (readable) read(); // what fails there says nothing of what was set
   };
   return (
     <>
@@ -52,28 +45,7 @@ export function PropertyRow({ object, member, live, route }: MemberRowProps) {
         </div>
       )}
       <Failure text={reading.failure} />
-      {writable && (
-        <form class="row-line" onSubmit={write}>
-          <ValueInput
-            quiet
-            label={t("New value of {0}", member.name)}
-            type={member.type}
-            text={text}
-            disabled={!live}
-            onText={setText}
-          />
-          <button class="button" type="submit" disabled={!live || writing.busy}>
-            {t("Set")}
-            <span class="unseen"> {member.name}</span>
-          </button>
-        </form>
-      )}
-      <Refusal
-        failure={writing.failure}
-        isLocked={writing.isLocked}
-        object={live ? object : null}
-        place={placeOf(route)}
-      />
+      {writable && <ValueForm {...props} label={t("New value of {0}", member.name)} word={t("Set")} give={write} />}
     </>
   );
 }

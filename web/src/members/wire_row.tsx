@@ -1,9 +1,8 @@
 // A wire: its newest value, how often one comes, and a plot of the numbers in it; and a field to send one.
 // Layer: web/members.
 
-import { useMemo, useState } from "preact/hooks";
+import { useMemo } from "preact/hooks";
 import { t } from "../app/language";
-import { placeOf } from "../app/router";
 import { Plot } from "../chart/plot";
 import { formatRate } from "../live/rate";
 import { useEach, useFeed } from "../live/use_feed";
@@ -11,20 +10,26 @@ import { Series } from "../robot/series";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { readingsOf } from "../values/numeric";
-import { parseInput } from "../values/parse";
-import { Refusal } from "./refusal";
-import { PATIENT, RowHead, useAction } from "./row";
+import { PATIENT, RowHead } from "./row";
 import type { MemberRowProps } from "./row";
-import { initialText, ValueInput } from "./value_input";
+import { ValueForm } from "./value_form";
 
-export function WireRow({ object, member, live, route }: MemberRowProps) {
+export function WireRow(props: MemberRowProps) {
+  const { object, member, live } = props;
   const readable = !member.modifiers.includes("writeonly");
   const writable = !member.modifiers.includes("readonly");
   return (
     <>
       <RowHead member={member} />
       {readable && <WireReader object={object} name={member.name} live={live} />}
-      {writable && <WireWriter object={object} name={member.name} type={member.type} live={live} route={route} />}
+      {writable && (
+        <ValueForm
+          {...props}
+          label={t("Value to send on {0}", member.name)}
+          word={t("Send")}
+          give={(value) => object.poke(member.name, value, PATIENT)}
+        />
+      )}
     </>
   );
 }
@@ -65,45 +70,6 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         {look.stale !== null && t("; this one is {0}", look.stale)}
       </p>
       <Failure text={look.failure} />
-    </>
-  );
-}
-
-function WireWriter({
-  object,
-  name,
-  type,
-  live,
-  route,
-}: Omit<MemberRowProps, "member"> & { name: string; type: string }) {
-  const [text, setText] = useState(initialText(type));
-  const sending = useAction();
-  const send = (event: Event): void => {
-    event.preventDefault();
-    sending.run(async () => object.poke(name, parseInput(text, type), PATIENT));
-  };
-  return (
-    <>
-      <form class="row-line" onSubmit={send}>
-        <ValueInput
-          quiet
-          label={t("Value to send on {0}", name)}
-          type={type}
-          text={text}
-          disabled={!live}
-          onText={setText}
-        />
-        <button class="button" type="submit" disabled={!live || sending.busy}>
-          {t("Send")}
-          <span class="unseen"> {name}</span>
-        </button>
-      </form>
-      <Refusal
-        failure={sending.failure}
-        isLocked={sending.isLocked}
-        object={live ? object : null}
-        place={placeOf(route)}
-      />
     </>
   );
 }

@@ -8,6 +8,7 @@ import type { AgentCommand, AgentSession } from "../gateway/agent_sessions";
 import type { AgentsDesk } from "../gateway/agents";
 import { itemsOf } from "../gateway/polled_list";
 import { Folded } from "../ui/folded";
+import { Ledger } from "../ui/ledger";
 import { clockTime, span } from "../ui/words";
 import { headline, usePolled } from "./polled";
 
@@ -63,25 +64,15 @@ function SessionRow({ session, now }: { session: AgentSession; now: number }) {
   );
 }
 
-/** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
+const COLUMNS = ["Time", "Tool", "Member", "Values", "State"];
+
 function Commands({ name, commands }: { name: string; commands: AgentCommand[] }) {
   return (
-    <table class="ledger" role="table" aria-label={t("Last commands of {0}", name)}>
-      <thead role="rowgroup">
-        <tr role="row">
-          {["Time", "Tool", "Member", "Values", "State"].map((column) => (
-            <th key={column} role="columnheader" scope="col">
-              {t(column)}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody role="rowgroup">
-        {commands.map((each, row) => (
-          <CommandRow key={row} command={each} />
-        ))}
-      </tbody>
-    </table>
+    <Ledger label={t("Last commands of {0}", name)} columns={COLUMNS}>
+      {commands.map((each, row) => (
+        <CommandRow key={row} command={each} />
+      ))}
+    </Ledger>
   );
 }
 

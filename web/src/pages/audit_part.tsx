@@ -8,6 +8,7 @@ import { askDeeds } from "../gateway/audit";
 import type { Deed, Deeds } from "../gateway/audit";
 import { session } from "../gateway/session";
 import { Folded } from "../ui/folded";
+import { Ledger } from "../ui/ledger";
 import { useAsked } from "../ui/use_asked";
 import { clockTime, sentence } from "../ui/words";
 
@@ -71,25 +72,15 @@ function headline(answer: Deeds | null): string {
   return answer.isAll ? t("All that is recorded, the newest first.") : t("The newest records; there are older ones.");
 }
 
-/** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
+const COLUMNS = ["Time", "User", "Event", "Member", "State"];
+
 function DeedTable({ deeds }: { deeds: readonly Deed[] }) {
   return (
-    <table class="ledger" role="table" aria-label={t("What users did")}>
-      <thead role="rowgroup">
-        <tr role="row">
-          {["Time", "User", "Event", "Member", "State"].map((column) => (
-            <th key={column} role="columnheader" scope="col">
-              {t(column)}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody role="rowgroup">
-        {deeds.map((each) => (
-          <DeedRow key={each.seq} deed={each} />
-        ))}
-      </tbody>
-    </table>
+    <Ledger label={t("What users did")} columns={COLUMNS}>
+      {deeds.map((each) => (
+        <DeedRow key={each.seq} deed={each} />
+      ))}
+    </Ledger>
   );
 }
 

@@ -6,6 +6,7 @@ import { itemsOf } from "../gateway/polled_list";
 import { subscriptionsAt } from "../gateway/subscriptions";
 import type { Subscription } from "../gateway/subscriptions";
 import { Folded } from "../ui/folded";
+import { Ledger } from "../ui/ledger";
 import { ageText } from "../ui/words";
 import { headline, usePolled } from "./polled";
 
@@ -48,25 +49,15 @@ function Subscriptions({ device, online, stale }: Props) {
   );
 }
 
-/** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
+const COLUMNS = ["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"];
+
 function Table({ device, subscriptions }: { device: string; subscriptions: Subscription[] }) {
   return (
-    <table class="ledger" role="table" aria-label={t("Subscriptions of {0}", device)}>
-      <thead role="rowgroup">
-        <tr role="row">
-          {["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"].map((name) => (
-            <th key={name} role="columnheader" scope="col" title={HINTS[name] && t(HINTS[name])}>
-              {t(name)}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody role="rowgroup">
-        {subscriptions.map((each, row) => (
-          <Row key={`${each.path}.${each.member} ${each.client} ${row}`} subscription={each} />
-        ))}
-      </tbody>
-    </table>
+    <Ledger label={t("Subscriptions of {0}", device)} columns={COLUMNS} hints={HINTS}>
+      {subscriptions.map((each, row) => (
+        <Row key={`${each.path}.${each.member} ${each.client} ${row}`} subscription={each} />
+      ))}
+    </Ledger>
   );
 }
 
