@@ -1,6 +1,5 @@
 """Images of devices as browsers show them: PNG, JPEG, one after another as MJPEG; sizes that lie are refused."""
 import base64
-import http.client
 import io
 import json
 import os
@@ -15,6 +14,7 @@ from PIL import Image
 
 from directions import PEERS
 from http_api import ask
+from motion_jpeg import Motion
 from processes import Background, start_gateway
 
 BASE = "/api/v1/devices/interop/camera"
@@ -148,36 +148,13 @@ def test_without_a_word_for_it_three_bytes_are_blue_green_red(gateway):
     assert image.tobytes() == Image.frombytes("RGB", (4, 2), gradient(4, 2, 3), "raw", "BGR").tobytes()
 
 
-class Motion:
-    """Parts of a multipart/x-mixed-replace stream."""
-
-    def __init__(self, port, path, headers={}):
-        self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-        self.connection.request("GET", BASE + path, headers=headers)
-        self.response = self.connection.getresponse()
-        assert self.response.headers["Content-Type"] == "multipart/x-mixed-replace; boundary=frame"
-        assert self.response.readline() == b"--frame\r\n"
-
-    def next(self):
-        assert self.response.readline() == b"Content-Type: image/jpeg\r\n"
-        size = int(self.response.readline().split(b": ")[1])
-        assert self.response.readline() == b"\r\n"
-        image = Image.open(io.BytesIO(self.response.read(size)))
-        assert self.response.readline() + self.response.readline() == b"\r\n--frame\r\n"
-        return image
-
-    def close(self):
-        self.response.close()
-        self.connection.close()
-
-
 def is_of(picture, shade):
     return picture.size == (64, 48) and abs(picture.getpixel((20, 20)) - shade) <= 2
 
 
 @pytest.mark.parametrize("path, headers", [("/frames?as=mjpeg", {}), ("/live", {"Accept": "multipart/x-mixed-replace"})])
 def test_frames_as_they_come(gateway, path, headers):
-    motion = Motion(gateway, path, headers)
+    motion = Motion(gateway, BASE + path, headers)
     for shade in (50, 150, 250):
         assert ask(gateway, "POST", "/show", {"frame": frame(64, 48, "mono8", bytes([shade]) * 3072)}, base=BASE).status == 200
         while not is_of(motion.next(), shade):
@@ -188,7 +165,7 @@ def test_frames_as_they_come(gateway, path, headers):
 
 
 def test_a_slow_viewer_gets_the_newest(gateway):
-    motion = Motion(gateway, "/frames?as=mjpeg")
+    motion = Motion(gateway, BASE + "/frames?as=mjpeg")
     noise = os.urandom(1000 * 1000)
     for _ in range(60):  # as JPEG far more than sockets hold
         ask(gateway, "POST", "/show", {"frame": frame(1000, 1000, "mono8", noise)}, base=BASE)
@@ -201,7 +178,7 @@ def test_a_slow_viewer_gets_the_newest(gateway):
 
 
 def test_a_slow_viewer_gets_the_last_one_before_the_end(gateway):
-    motion = Motion(gateway, "/clip?as=mjpeg")
+    motion = Motion(gateway, BASE + "/clip?as=mjpeg")
     noise = os.urandom(1000 * 1000)
     for _ in range(60):
         ask(gateway, "POST", "/show", {"frame": frame(1000, 1000, "mono8", noise)}, base=BASE)

@@ -1,7 +1,7 @@
 // The dashboard at drivers of the field, as they are published.
 import { expect, test } from "@playwright/test";
 import { arrange } from "../board";
-import { pythonDriver } from "../peers";
+import { pythonDriver, startPeer } from "../peers";
 import { freePort, startGateway, webRoot } from "../processes";
 
 test("Reynard is driven, is spoken to, and has the colour that its form shows", async ({ page }) => {
@@ -52,6 +52,44 @@ test("Reynard is driven, is spoken to, and has the colour that its form shows", 
   } finally {
     await gateway.program.kill("SIGTERM");
     await reynard.kill();
+  }
+});
+
+test("the camera driver's pictures have the colour that its settings give, and its board says what it is", async ({
+  page,
+}) => {
+  const camera = await startPeer("test/interop/peers/camera.py", "camera");
+  try {
+    await page.goto(`${camera.url}#/devices/peer/camera`);
+    const picture = page.locator('[data-panel="image"]');
+    await picture.getByRole("button", { name: "Start stream" }).click();
+    const blue = () =>
+      picture
+        .locator("canvas")
+        .evaluate((canvas) => (canvas as HTMLCanvasElement).getContext("2d")?.getImageData(7, 7, 1, 1).data[2]);
+    await expect.poll(blue).toBeGreaterThan(190);
+
+    const form = (name: string) => page.locator(`[data-form="${name}"]`);
+    await form("setf_param")
+      .getByLabel(/^param_name /)
+      .fill("brightness");
+    await form("setf_param")
+      .getByLabel(/^value /)
+      .fill("20");
+    await form("setf_param").getByRole("button", { name: "Call setf_param" }).click();
+    await expect.poll(blue).toBeLessThan(30);
+    await form("getf_param")
+      .getByLabel(/^param_name /)
+      .fill("brightness");
+    await form("getf_param").getByRole("button", { name: "Call getf_param" }).click();
+    await expect(form("getf_param").getByRole("status")).toContainText("20");
+
+    const table = (member: string) =>
+      page.locator('[data-panel="table"]').filter({ has: page.getByRole("heading", { name: member }) });
+    await expect(table("camera_info").getByRole("row", { name: "name film" })).toBeVisible();
+    await expect(table("param_info")).toContainText("Brightness of the camera (CAP_PROP_BRIGHTNESS property)");
+  } finally {
+    await camera.stop();
   }
 });
 
