@@ -16,7 +16,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, Targ
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
     refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
-  auto arguments = co_await arguments_of(*request, *target, making_);
+  auto arguments = co_await arguments_of(*request, *target, making());
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   const auto reserved = reserve(*request);
   Generator generator{target, target->client->next_generator()};
@@ -57,7 +57,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
   step.generator = generator.id;
   if (takes_values(*target->member)) {
     const auto& taken = target->member->parameters.back();
-    auto given = co_await value_of(*request, *target, taken.type, taken.name, making_);
+    auto given = co_await value_of(*request, *target, taken.type, taken.name, making());
     step.arguments.push_back(std::move(given));
   }
   rr::Value value;
@@ -74,7 +74,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
     rr::add_key(out, "done") = true;
     co_return out;
   }
-  auto json = co_await json_of(*target, value, making_.form, making_.workers);
+  auto json = co_await json_of(*target, value, place_.form, gateway_.workers());
   rr::add_key(out, "value") = std::move(json);
   rr::add_key(out, "done") = false;
   co_return out;

@@ -32,15 +32,14 @@ void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection ne
 }
 
 rr::awaitable<rr::Value> value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
-                                  const std::string& name, const JsonMaking& how) {
+                                  const std::string& name, JsonMaking how) {
   const auto& json = request.at("value");
   const auto make = [&] { return rr::value_from_json(json, type, target.types(), how.form, name); };
   if (!request.is_large() || !is_apart(type)) co_return value_or_throw(make());
   co_return value_or_throw(co_await how.workers.run(make));
 }
 
-rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target,
-                                                   const JsonMaking& how) {
+rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target, JsonMaking how) {
   static const auto none = rr::Json::object();
   const auto* given = request.find("args");
   const auto make = [&] {

@@ -39,10 +39,9 @@ struct JsonMaking {
 
 /// The request's "value", as one of `type`. `name`  of errors.
 rr::awaitable<rr::Value> value_of(const JsonRequest& request, const Target& target, const rr::TypeDefinition& type,
-                                  const std::string& name, const JsonMaking& how);
+                                  const std::string& name, JsonMaking how);
 /// The request's "args", for the target's function.
-rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target,
-                                                   const JsonMaking& how);
+rr::awaitable<std::vector<rr::Value>> arguments_of(const JsonRequest& request, const Target& target, JsonMaking how);
 
 using JsonAnswer = rr::awaitable<rr::OrderedJson>;
 JsonAnswer describe_target(JsonRequestPtr request, TargetPtr target, JsonMaking how);

@@ -36,7 +36,7 @@ rr::Error error_of(const std::exception_ptr& thrown) {
 
 template <auto Answer>
 rr::awaitable<rr::OrderedJson> JsonOperations::pass_on(JsonRequestPtr request, TargetPtr target) {
-  return Answer(std::move(request), std::move(target), making_);
+  return Answer(std::move(request), std::move(target), making());
 }
 
 const JsonOperations::Operation JsonOperations::operations[] = {
@@ -73,16 +73,21 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"login", Verb::read, &JsonOperations::login, {.has_target = false, .comes_first = true}},
 };
 
-const JsonOperations::Operation* JsonOperations::find_operation(std::string_view name) {
-  const auto* found = std::find_if(std::begin(operations), std::end(operations),
-                                   [&](const Operation& each) { return each.name == name; });
-  return found == std::end(operations) ? nullptr : found;
+const JsonOperations::Operation JsonOperations::unknown_operation = {
+    "", Verb::read, &JsonOperations::refuse_unknown, {.has_target = false}};
+
+const JsonOperations::Operation& JsonOperations::operation_of(const JsonRequest& request) {
+  const auto* name = request.find("op");
+  if (!name || !name->is_string()) return unknown_operation;
+  const auto* found = std::find_if(std::begin(operations), std::end(operations), [&](const Operation& each) {
+    return each.name == name->get_ref<const std::string&>();
+  });
+  return found == std::end(operations) ? unknown_operation : *found;
 }
 
 JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<Outbox> outbox)
     : gateway_(gateway),
       place_(std::move(place)),
-      making_{gateway.workers(), place_.form},
       outbox_(std::move(outbox)),
       questions_(place_.device->executor(), place_.form, outbox_),
       sent_(place_.device->executor()) {}
@@ -117,12 +122,12 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     read = parse();
   if (!read) co_return tell_error("null", read.error());
   JsonRequestPtr request = std::make_shared<const JsonRequest>(std::move(*read));
-  const auto* name = request->find("op");
-  const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
-  const bool passes = operation && (operation->traits.gives_back || is_urgent(*request, *operation));
+  const auto& operation = operation_of(*request);
+  const bool passes = operation.traits.gives_back || is_urgent(*request, operation);
   if (!has_room && !passes) co_return tell_no_room(request->id());
-  if (operation && operation->traits.keeps_order && !passes) {
-    co_await queue(std::move(request), std::move(memory));
+  if (operation.traits.keeps_order && !passes) {
+    Packet packet{std::move(request), operation, std::move(memory)};  // named: see above
+    co_await queue(std::move(packet));
     co_return;
   }
   if (running_ >= (passes ? 2 * max_running : max_running))
@@ -130,7 +135,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
                                         "more than " + std::to_string(max_running) + " requests are not answered yet"));
   Passes held;
-  if (!passes && (!operation || !operation->traits.is_free)) {
+  if (!passes && !operation.traits.is_free) {
     auto entered = gateway_.http_access().enter(place_.from.network, place_.standing->identity().subject(),
                                                 place_.device->config().name, gateway_.config().rates);
     if (!entered) {
@@ -141,14 +146,14 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     held = std::move(*entered);
   }
   ++running_;
-  if (operation && operation->traits.comes_first)
-    co_await run(shared_from_this(), std::move(request), std::move(held), std::move(memory));
+  auto running = run(shared_from_this(), std::move(request), operation, std::move(held), std::move(memory));
+  if (operation.traits.comes_first)
+    co_await std::move(running);
   else
-    asio::co_spawn(place_.device->executor(),
-                   run(shared_from_this(), std::move(request), std::move(held), std::move(memory)), asio::detached);
+    asio::co_spawn(place_.device->executor(), std::move(running), asio::detached);
 }
 
-rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::Charge memory) {
+rr::awaitable<void> JsonOperations::queue(Packet packet) {
   for (;;) {
     const auto end_of_pause = last_sent_ + longest_pause;
     if (packets_.size() < max_packets || is_stopped_ || std::chrono::steady_clock::now() >= end_of_pause) break;
@@ -157,11 +162,12 @@ rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::
   }
   if (is_stopped_) co_return;
   if (packets_.size() >= max_packets)
-    co_return tell_error(request->id(), rr::make_error(rr::ErrorCode::out_of_system_resource,
-                                                       std::to_string(packets_.size()) +
-                                                           " packets wait to be sent already, and the device takes "
-                                                           "none; wait for the answers"));
-  packets_.push_back({std::move(request), std::move(memory)});
+    co_return tell_error(
+        packet.request->id(),
+        rr::make_error(rr::ErrorCode::out_of_system_resource,
+                       std::to_string(packets_.size()) + " packets wait to be sent already, and the device takes "
+                                                         "none; wait for the answers"));
+  packets_.push_back(std::move(packet));
   if (packets_.size() > 1) co_return;
   last_sent_ = std::chrono::steady_clock::now();
   asio::co_spawn(place_.device->executor(), send_queued(shared_from_this()), asio::detached);
@@ -170,10 +176,10 @@ rr::awaitable<void> JsonOperations::queue(JsonRequestPtr request, MemoryBudget::
 rr::awaitable<void> JsonOperations::send_queued(std::shared_ptr<JsonOperations> self) {
   auto& packets = self->packets_;
   while (!packets.empty()) {
-    auto request = std::move(packets.front().request);
+    auto& packet = packets.front();
     const Passes none;
     ++self->running_;
-    co_await run(self, std::move(request), none, std::move(packets.front().memory));
+    co_await run(self, std::move(packet.request), packet.operation, none, std::move(packet.memory));
     packets.pop_front();
     if (self->is_stopped_) packets.clear();
     self->last_sent_ = std::chrono::steady_clock::now();
@@ -193,11 +199,12 @@ bool JsonOperations::is_urgent(const JsonRequest& request, const Operation& oper
 }
 
 rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request,
-                                        [[maybe_unused]] Passes passes, [[maybe_unused]] MemoryBudget::Charge memory) {
+                                        const Operation& operation, [[maybe_unused]] Passes passes,
+                                        [[maybe_unused]] MemoryBudget::Charge memory) {
   std::optional<rr::Error> error;
   std::string answer;
   try {
-    auto result = co_await self->perform(request);
+    auto result = co_await self->perform(request, operation);
     const bool is_wanted = request->id() != "null";
     const bool is_large = held_bytes(result) > large_json_bytes;
     auto write = [id = request->id(), result = std::move(result)] { return json_answer(id, result); };
@@ -218,19 +225,16 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Js
   co_await self->gateway_.workers().run(std::move(free));
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request) {
-  const auto name = request->text("op", "");
-  const auto* operation = find_operation(name);
-  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(name));
+rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request, const Operation& operation) {
   TargetPtr target;
-  if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
-  target = co_await find(request, *operation);
-  const CallLog logged(place_.trace, place_.device->config().name, operation->name, name_of(*target));
-  const auto entry = admit(*target, *operation);
+  if (!operation.traits.has_target) co_return co_await (this->*operation.perform)(request, target);
+  target = co_await find(request, operation);
+  const CallLog logged(place_.trace, place_.device->config().name, operation.name, name_of(*target));
+  const auto entry = admit(*target, operation);
   rr::OrderedJson result;
   std::optional<rr::Error> error;
   try {
-    result = co_await (this->*operation->perform)(request, target);
+    result = co_await (this->*operation.perform)(request, target);
   } catch (...) {
     error = error_of(std::current_exception());
   }
@@ -312,6 +316,10 @@ void JsonOperations::stop() {
   questions_.end_all();
   // Not when the last request that is under way lets go of it: the device may take long to answer that.
   if (const auto own = std::exchange(own_, nullptr)) own->leave();
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::refuse_unknown(JsonRequestPtr request, TargetPtr) {
+  refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(request->text("op", "")));
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::login(JsonRequestPtr request, TargetPtr) {

@@ -61,7 +61,9 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     Traits traits = {};
   };
   static const Operation operations[];
-  static const Operation* find_operation(std::string_view name);
+  /// For all names of which there is none; under the same bounds as others, and then refused.
+  static const Operation unknown_operation;
+  static const Operation& operation_of(const JsonRequest& request);
 
   /// What a request has opened; named by its id.
   struct Subscription {
@@ -87,16 +89,17 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   };
   struct Packet {
     JsonRequestPtr request;
+    const Operation& operation;
     MemoryBudget::Charge memory;
   };
 
   using Passes = std::shared_ptr<const HttpAccess::Passes>;
-  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request, Passes passes,
-                                 MemoryBudget::Charge memory);
+  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request,
+                                 const Operation& operation, Passes passes, MemoryBudget::Charge memory);
   /// Sends a packet behind those that wait, or refuses it where too many do.
-  rr::awaitable<void> queue(JsonRequestPtr request, MemoryBudget::Charge memory);
+  rr::awaitable<void> queue(Packet packet);
   static rr::awaitable<void> send_queued(std::shared_ptr<JsonOperations> self);
-  rr::awaitable<rr::OrderedJson> perform(JsonRequestPtr request);
+  rr::awaitable<rr::OrderedJson> perform(JsonRequestPtr request, const Operation& operation);
   rr::awaitable<TargetPtr> find(JsonRequestPtr request, const Operation& operation);
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
   AuditEntryPtr admit(const Target& target, const Operation& operation);
@@ -104,6 +107,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<std::shared_ptr<ValueClient>> shared_client();
   /// See LeaseConfig::is_urgent().
   bool is_urgent(const JsonRequest& request, const Operation& operation) const;
+  JsonMaking making() const { return {gateway_.workers(), place_.form}; }
   void tell_error(const std::string& id, const rr::Error& error);
 
   /// To a function of json_members.hpp.
@@ -119,6 +123,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<rr::OrderedJson> callback(JsonRequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> answer(JsonRequestPtr request, TargetPtr);
   rr::awaitable<rr::OrderedJson> login(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> refuse_unknown(JsonRequestPtr request, TargetPtr);
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
   Reserved reserve(const JsonRequest& request);
@@ -138,7 +143,6 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   GatewayState& gateway_;
   JsonSocketPlace place_;
-  const JsonMaking making_;
   std::shared_ptr<Outbox> outbox_;
   std::shared_ptr<ValueClient> own_;  ///< once something needs it; then everything uses it
   std::map<std::string, Open> open_;

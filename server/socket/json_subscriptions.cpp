@@ -102,7 +102,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(JsonRequestPtr reques
 rr::awaitable<rr::OrderedJson> JsonOperations::send(JsonRequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "send", {rr::MemberKind::wire, rr::MemberKind::pipe});
   expect_direction(member, rr::MemberDirection::readonly);
-  auto value = co_await value_of(*request, *target, member.type, member.name, making_);
+  auto value = co_await value_of(*request, *target, member.type, member.name, making());
   const std::pair key(target->path(), member.name);
   if (!senders_.contains(key)) {
     if (senders_.size() >= max_open)
