@@ -4,10 +4,6 @@ namespace rr {
 
 namespace {
 
-bool is_generator(const ParameterDefinition& parameter) {
-  return parameter.type.container == ContainerKind::generator;
-}
-
 bool returns_nothing(const MemberDefinition& member) {
   return member.type.type == DataType::void_t;
 }
@@ -31,7 +27,7 @@ Result<Value> read_element(const Message& message, const MessageEntry& entry, st
 Result<> write_arguments(Message& message, std::span<const Value> arguments, const MemberDefinition& member,
                          const TypeRegistry& types) {
   const auto& parameters = member.parameters;
-  const std::size_t expected = parameters.size() - (!parameters.empty() && is_generator(parameters.back()) ? 1 : 0);
+  const std::size_t expected = parameters.size() - (member.step_parameter() ? 1 : 0);
   if (arguments.size() != expected)
     return make_error(ErrorCode::invalid_argument, std::string(member_kind_name(member.kind)) + " '" + member.name +
                                                        "': " + std::to_string(arguments.size()) + " arguments given, " +
@@ -47,7 +43,7 @@ Result<std::vector<Value>> read_arguments(const Message& message, const MessageE
   std::vector<Value> arguments;
   arguments.reserve(member.parameters.size());
   for (const auto& parameter : member.parameters) {
-    if (is_generator(parameter)) continue;
+    if (&parameter == member.step_parameter()) continue;
     auto value = read_element(message, entry, parameter.name, member, parameter.type, types);
     if (!value) return value.error();
     arguments.push_back(std::move(*value));

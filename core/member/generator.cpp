@@ -18,12 +18,6 @@ std::string generator_subject(const MemberDefinition& function) {
   return "generator '" + function.name + "'";
 }
 
-const ParameterDefinition* generator_parameter(const MemberDefinition& function) {
-  if (function.parameters.empty()) return nullptr;
-  const auto& last = function.parameters.back();
-  return last.type.container == ContainerKind::generator ? &last : nullptr;
-}
-
 bool has_values(const MemberDefinition& function) {
   return function.type.container == ContainerKind::generator;
 }
@@ -75,7 +69,7 @@ Result<> write_generator_step(Message& message, GeneratorStep step, std::int32_t
   if (step == GeneratorStep::abort) write_error(message, {ErrorCode::abort_operation, "Generator abort requested"});
   write_generator_index(message, index);
   if (step != GeneratorStep::next) return {};
-  const auto* definition = generator_parameter(function);
+  const auto* definition = function.step_parameter();
   if (parameter.has_value() != (definition != nullptr))
     return make_error(ErrorCode::invalid_argument,
                       generator_subject(function) + (definition ? " takes a value with each step, none was given"
@@ -86,7 +80,7 @@ Result<> write_generator_step(Message& message, GeneratorStep step, std::int32_t
 
 Result<std::optional<Value>> read_generator_parameter(const Message& message, const MessageEntry& entry,
                                                       const MemberDefinition& function, const TypeRegistry& types) {
-  const auto* definition = generator_parameter(function);
+  const auto* definition = function.step_parameter();
   if (!definition) return std::optional<Value>();
   auto value = read_item(message, entry, "parameter", function, definition->type, types);
   if (!value) return value.error();

@@ -190,13 +190,12 @@ void CppEmitter::emit_definition_text() {
 
 std::span<const ParameterDefinition> CppEmitter::call_parameters(const MemberDefinition& member) {
   const std::span<const ParameterDefinition> all = member.parameters;
-  const bool takes_values = !all.empty() && all.back().type.container == ContainerKind::generator;
-  return all.first(all.size() - (takes_values ? 1 : 0));
+  return all.first(all.size() - (member.step_parameter() ? 1 : 0));
 }
 
 std::string CppEmitter::step_parameter(const MemberDefinition& member) const {
-  const bool takes_values = call_parameters(member).size() < member.parameters.size();
-  return takes_values ? types_.value(member.parameters.back().type) : "void";
+  const auto* parameter = member.step_parameter();
+  return parameter ? types_.value(parameter->type) : "void";
 }
 
 std::string CppEmitter::parameters(const MemberDefinition& member) const {

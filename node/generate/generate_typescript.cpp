@@ -348,8 +348,8 @@ std::string TypeScriptEmitter::member_type(const MemberDefinition& member) {
     return from_client("FunctionMember") + "<" + parameters_text(parameters, Way::sent) + ", " +
            type_text(member.type, Way::received) + ">";
   std::string next = "void";
-  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
-    next = type_text(parameters.back().type, Way::sent);
+  if (const auto* step = member.step_parameter()) {
+    next = type_text(step->type, Way::sent);
     parameters = parameters.first(parameters.size() - 1);
   }
   return from_client("GeneratorMember") + "<" + parameters_text(parameters, Way::sent) + ", " +

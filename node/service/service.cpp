@@ -121,8 +121,8 @@ void Object::set_generator(std::string_view name, GeneratorHandler handler) {
   if (!member.is_generator()) refuse(where + " is no generator function: it takes a handler of function()");
   auto parameters = member.parameters;
   std::vector<ParameterDefinition> step_parameters;
-  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
-    step_parameters = {{parameters.back().name, step_type(parameters.back().type)}};
+  if (const auto* step = member.step_parameter()) {
+    step_parameters = {{step->name, step_type(step->type)}};
     parameters.pop_back();
   }
   check_parameters(where, handler.parameters, parameters);

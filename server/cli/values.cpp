@@ -201,9 +201,8 @@ std::vector<rr::Value> read_arguments(const RemoteMember& found, const std::vect
 
 void call_function(const RemoteMember& found, const ValueOptions& options) {
   const auto& member = *found.member;
-  for (const auto& parameter : member.parameters)
-    if (parameter.type.container == rr::ContainerKind::generator)
-      throw NotUnderstood(rr::quote(member.name) + " takes values while it runs, which this command can't give");
+  if (member.step_parameter())
+    throw NotUnderstood(rr::quote(member.name) + " takes values while it runs, which this command can't give");
   const auto values = read_arguments(found, options.arguments->results());
   auto type = member.type;
   if (member.is_generator()) {

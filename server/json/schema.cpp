@@ -174,6 +174,20 @@ OrderedJson type_schema(const TypeDefinition& type) {
   return out;
 }
 
+OrderedJson arguments_schema(const MemberDefinition& member) {
+  OrderedJson out{{"type", "object"}};
+  auto& properties = out["properties"] = OrderedJson::object();
+  auto required = OrderedJson::array();
+  for (const auto& parameter : member.parameters) {
+    if (&parameter == member.step_parameter()) continue;
+    add_key(properties, parameter.name) = type_schema(parameter.type);
+    required.push_back(parameter.name);
+  }
+  if (!required.empty()) out["required"] = std::move(required);
+  out["additionalProperties"] = false;
+  return out;
+}
+
 std::optional<OrderedJson> named_type_schema(const TypeRegistry& types, const std::string& qualified_name,
                                              NoteDocumentation note) {
   if (const auto* definition = types.find_enum(qualified_name)) return enum_schema(*definition, qualified_name, note);

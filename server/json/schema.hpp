@@ -13,6 +13,8 @@ namespace rr {
 /// The schema of a type (JSON Schema 2020-12, as OpenAPI 3.1 takes it). Named types are references to
 /// "#/components/schemas/" and their qualified name. Each schema tells its exact type as "x-rr-type".
 OrderedJson type_schema(const TypeDefinition& type);
+/// The schema of an object with a value for each parameter, by its name; not for the one that each step takes.
+OrderedJson arguments_schema(const MemberDefinition& member);
 
 /// Puts what a definition says of a type or a field into its schema.
 using NoteDocumentation = void (*)(OrderedJson& schema, const std::string& documentation);

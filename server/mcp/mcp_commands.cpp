@@ -92,7 +92,7 @@ const rr::MemberDefinition& commanded_member(const Target& target, Verb verb) {
            rr::quote(name_of(target)) + " is a " +
                (member ? std::string(member_kind_name(member->kind)) : std::string("object")) +
                "; agents call functions and set properties, and write to nothing else");
-  if (is_call && takes_values(*member))
+  if (is_call && member->step_parameter())
     refuse(rr::ErrorCode::invalid_operation,
            rr::quote(member->name) + " is a generator that is sent a value for each step; agents call none of these");
   expect_direction(*member, rr::MemberDirection::readonly);

@@ -19,22 +19,6 @@ void add_text(rr::OrderedJson& out, const std::string& documentation) {
   if (!documentation.empty()) rr::add_key(out, from_device) = bounded_text(plain_documentation(documentation));
 }
 
-rr::OrderedJson parameters_schema(const rr::MemberDefinition& member) {
-  auto out = rr::OrderedJson::object();
-  rr::add_key(out, "type") = "object";
-  auto properties = rr::OrderedJson::object();
-  auto required = rr::OrderedJson::array();
-  for (const auto& parameter : member.parameters) {
-    if (parameter.type.container == rr::ContainerKind::generator) continue;
-    rr::add_key(properties, parameter.name) = rr::type_schema(parameter.type);
-    required.push_back(parameter.name);
-  }
-  rr::add_key(out, "properties") = std::move(properties);
-  if (!required.empty()) rr::add_key(out, "required") = std::move(required);
-  rr::add_key(out, "additionalProperties") = false;
-  return out;
-}
-
 rr::OrderedJson terms_for_agent(const AgentTerms& terms) {
   auto limits = rr::OrderedJson::object();
   for (const auto& [place, range] : terms.limits) rr::add_key(limits, place) = {range.least, range.most};
@@ -65,7 +49,7 @@ rr::OrderedJson describe_member(const Target& target, const rr::MemberDefinition
   if (terms) rr::add_key(out, "terms") = terms_for_agent(*terms);
   const bool has_parameters = member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
                               member.kind == rr::MemberKind::callback;
-  if (has_parameters) rr::add_key(out, "parameters") = parameters_schema(member);
+  if (has_parameters) rr::add_key(out, "parameters") = rr::arguments_schema(member);
   if (member.kind == rr::MemberKind::objref)
     rr::add_key(out, "object") = true;  // its path leads on
   else if (member.kind != rr::MemberKind::event)
@@ -112,10 +96,6 @@ rr::OrderedJson named_types(const rr::OrderedJson& members, const rr::TypeRegist
 
 }  // namespace
 
-bool takes_values(const rr::MemberDefinition& function) {
-  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
-}
-
 std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
   std::vector<Verb> out;
   switch (member.kind) {
@@ -133,7 +113,7 @@ std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
       out.push_back(Verb::subscribe);
       break;
     case rr::MemberKind::function:
-      if (!takes_values(member)) out.push_back(Verb::call);
+      if (!member.step_parameter()) out.push_back(Verb::call);
       break;
     default:
       break;

@@ -16,9 +16,6 @@ inline constexpr std::string_view from_device = "from_device";
 /// Text of a device or an agent as UTF-8, cut where it is longer than anybody needs. `most`  bytes.
 std::string bounded_text(std::string_view text, std::size_t most = 1000);
 
-/// Whether a function is a generator that is sent values, one for each step.
-bool takes_values(const rr::MemberDefinition& function);
-
 /// The verbs by which an agent can use a member at all.
 std::vector<Verb> uses_of(const rr::MemberDefinition& member);
 

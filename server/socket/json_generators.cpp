@@ -4,14 +4,6 @@
 
 namespace rrgate {
 
-namespace {
-
-bool takes_values(const rr::MemberDefinition& function) {
-  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
-}
-
-}  // namespace
-
 rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
@@ -55,9 +47,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, Targ
   value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
   auto step = target->request(rr::CallKind::generator_next);
   step.generator = generator.id;
-  if (takes_values(*target->member)) {
-    const auto& taken = target->member->parameters.back();
-    auto given = co_await value_of(*request, *target, taken.type, taken.name, making());
+  if (const auto* taken = target->member->step_parameter()) {
+    auto given = co_await value_of(*request, *target, taken->type, taken->name, making());
     step.arguments.push_back(std::move(given));
   }
   rr::Value value;

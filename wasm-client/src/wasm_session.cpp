@@ -104,9 +104,8 @@ RequestId WasmSession::step_generator(GeneratorStep step, const JsValue& path, c
       break;
   }
   std::optional<Value> value;
-  const auto& parameters = target->definition->parameters;
-  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
-    value = read_value(parameter, parameters.back().type, parameters.back().name);
+  if (const auto* step_parameter = target->definition->step_parameter()) {
+    value = read_value(parameter, step_parameter->type, step_parameter->name);
     if (!value) return 0;
   }
   return remember(session_.next_generator(target->path, target->member, index, value, now_), target->definition->type);

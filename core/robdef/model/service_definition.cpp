@@ -52,9 +52,12 @@ MemberDirection MemberDefinition::direction() const {
 }
 
 bool MemberDefinition::is_generator() const {
-  return kind == MemberKind::function &&
-         (type.container == ContainerKind::generator ||
-          (!parameters.empty() && parameters.back().type.container == ContainerKind::generator));
+  return kind == MemberKind::function && (type.container == ContainerKind::generator || step_parameter());
+}
+
+const ParameterDefinition* MemberDefinition::step_parameter() const {
+  if (parameters.empty() || parameters.back().type.container != ContainerKind::generator) return nullptr;
+  return &parameters.back();
 }
 
 const MemberDefinition* EntityDefinition::find_member(std::string_view member) const {

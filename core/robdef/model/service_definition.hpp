@@ -86,6 +86,8 @@ struct MemberDefinition {
   MemberDirection direction() const;  ///< readonly wins where both are given
   /// A function whose return type or last parameter is a generator.
   bool is_generator() const;
+  /// Its last parameter where that is a generator, which takes a value with each step; null: there is none.
+  const ParameterDefinition* step_parameter() const;
   /// An objref to many objects: a list, or a map by int32 or string.
   bool is_indexed() const {
     return kind == MemberKind::objref && (type.container != ContainerKind::none || type.array != ArrayKind::none);

@@ -94,7 +94,7 @@ void verify_parameter_names(VerifyScope& scope, const MemberDefinition& member, 
     }
     if (names.insert(parameter.name).second) continue;
     // The reference leaves the generator out of its check.
-    const bool is_generator = &parameter == &member.parameters.back() && is_generator_type(parameter.type);
+    const bool is_generator = &parameter == member.step_parameter();
     const auto message = where + "the name is repeated, expected unique names";
     if (is_generator) {
       scope.relaxed("duplicate-name", member.line, parameter.name, message, member.name);
@@ -107,8 +107,7 @@ void verify_parameter_names(VerifyScope& scope, const MemberDefinition& member, 
 void verify_call(VerifyScope& scope, MemberDefinition& member) {
   const auto place = std::string(member_kind_name(member.kind)) + ' ' + quote(member.name);
   const bool may_generate = member.kind == MemberKind::function;
-  const bool has_generator =
-      may_generate && !member.parameters.empty() && is_generator_type(member.parameters.back().type);
+  const bool has_generator = may_generate && member.step_parameter();
   verify_parameter_names(scope, member, place);
   for (auto& parameter : member.parameters) {
     if (!resolve_type(scope, parameter.type, member.line)) continue;

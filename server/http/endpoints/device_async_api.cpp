@@ -92,7 +92,7 @@ OrderedJson async_api(std::string_view device, const std::string& base, const st
     const bool streams =
         is_event || ((member.kind == rr::MemberKind::wire || member.kind == rr::MemberKind::pipe) && can_read(member));
     if (!streams) continue;
-    auto payload = is_event ? arguments_schema(member.parameters) : rr::type_schema(member.type);
+    auto payload = is_event ? rr::arguments_schema(member) : rr::type_schema(member.type);
     auto& channel = add_key(channels, place.id) = OrderedJson{{"address", place.path}};
     for (const auto& index : place.indices) channel["parameters"][index] = OrderedJson::object();
     channel["messages"]["value"]["payload"] = std::move(payload);

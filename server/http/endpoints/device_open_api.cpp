@@ -117,8 +117,7 @@ class OpenApi {
         }
         break;
       case rr::MemberKind::event:
-        item["get"] =
-            operation(place, "stream", with_content("each event", events(arguments_schema(member.parameters))));
+        item["get"] = operation(place, "stream", with_content("each event", events(rr::arguments_schema(member))));
         break;
       case rr::MemberKind::memory:
         add_memory(place, schema, item, paths);
@@ -138,8 +137,8 @@ class OpenApi {
       content = json_content({{"type", "object"}, {"properties", {{"result", schema}}}, {"required", {"result"}}});
     if (!member.is_generator()) add_images(place, content, false);
     auto out = operation(place, "call", with_content("the result", std::move(content)));
-    if (takes_values_while_running(member)) out["deprecated"] = true;  // its parameter stream needs a WebSocket
-    if (!member.parameters.empty()) out["requestBody"] = body(arguments_schema(member.parameters));
+    if (member.step_parameter()) out["deprecated"] = true;  // its parameter stream needs a WebSocket
+    if (!member.parameters.empty()) out["requestBody"] = body(rr::arguments_schema(member));
     return out;
   }
 

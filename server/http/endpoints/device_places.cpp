@@ -18,10 +18,6 @@ constexpr std::size_t most_bytes = 1 << 20;
 /// What a member takes there by itself, and each of its parameters.
 constexpr std::size_t about_bytes_a_part = 256;
 
-bool has_index(const rr::MemberDefinition& objref) {
-  return objref.type.array != rr::ArrayKind::none || objref.type.container != rr::ContainerKind::none;
-}
-
 /// Many objrefs to few types make many paths.
 class PlaceWalk {
  public:
@@ -62,7 +58,7 @@ class PlaceWalk {
     const auto* target = place.service->types->find_entity(member.type.qualified_name);
     if (!target || std::find(chain_.begin(), chain_.end(), target) != chain_.end()) return;
     place.object_path += "." + member.name;
-    if (has_index(member)) {
+    if (member.is_indexed()) {
       auto name = member.name;
       while (std::find(place.indices.begin(), place.indices.end(), name) != place.indices.end()) name += "_";
       place.path += "/{" + name + "}";
@@ -111,28 +107,10 @@ OrderedJson schemas_of(const std::vector<DescribedService>& services) {
   return out;
 }
 
-OrderedJson arguments_schema(const std::vector<rr::ParameterDefinition>& parameters) {
-  OrderedJson out{{"type", "object"}};
-  auto& properties = out["properties"] = OrderedJson::object();
-  auto required = OrderedJson::array();
-  for (const auto& parameter : parameters) {
-    if (parameter.type.container == rr::ContainerKind::generator) continue;
-    add_key(properties, parameter.name) = rr::type_schema(parameter.type);
-    required.push_back(parameter.name);
-  }
-  if (!required.empty()) out["required"] = std::move(required);
-  out["additionalProperties"] = false;
-  return out;
-}
-
 void add_info(OrderedJson& out, std::string_view device) {
   out["info"] = {{"title", std::string(device)},
                  {"version", "1"},
                  {"description", "Objects of a Robot Raconteur node, told from its service definitions."}};
-}
-
-bool takes_values_while_running(const rr::MemberDefinition& member) {
-  return !member.parameters.empty() && member.parameters.back().type.container == rr::ContainerKind::generator;
 }
 
 }  // namespace rrgate

@@ -31,7 +31,6 @@ Places places_of(const std::string& base, const std::vector<DescribedService>& s
 std::string socket_id(const DescribedService& service);
 /// Of the named types of all services.
 rr::OrderedJson schemas_of(const std::vector<DescribedService>& services);
-rr::OrderedJson arguments_schema(const std::vector<rr::ParameterDefinition>& parameters);
 /// The documents say what they are about as every device of its kind does.
 void add_info(rr::OrderedJson& out, std::string_view device);
 
@@ -41,7 +40,6 @@ inline bool can_read(const rr::MemberDefinition& member) {
 inline bool can_write(const rr::MemberDefinition& member) {
   return member.direction() != rr::MemberDirection::readonly;
 }
-bool takes_values_while_running(const rr::MemberDefinition& member);
 
 // The documents.
 

@@ -63,13 +63,13 @@ OrderedJson thing_description(std::string_view device, const std::vector<Documen
       }
       item["forms"] = std::move(forms);
       add_key(properties, place.id) = with_variables(std::move(item), place);
-    } else if (member.kind == rr::MemberKind::function && !takes_values_while_running(member)) {
-      OrderedJson item{{"input", arguments_schema(member.parameters)}, {"output", rr::type_schema(member.type)}};
+    } else if (member.kind == rr::MemberKind::function && !member.step_parameter()) {
+      OrderedJson item{{"input", rr::arguments_schema(member)}, {"output", rr::type_schema(member.type)}};
       item["forms"] = OrderedJson::array({form(place, "invokeaction", "POST")});
       add_key(actions, place.id) = with_variables(std::move(item), place);
     } else if (member.kind == rr::MemberKind::event || (member.kind == rr::MemberKind::pipe && can_read(member))) {
       const bool is_event = member.kind == rr::MemberKind::event;
-      OrderedJson item{{"data", is_event ? arguments_schema(member.parameters) : rr::type_schema(member.type)}};
+      OrderedJson item{{"data", is_event ? rr::arguments_schema(member) : rr::type_schema(member.type)}};
       item["forms"] = OrderedJson::array({form(place, "subscribeevent", "GET", "sse")});
       add_key(events, place.id) = with_variables(std::move(item), place);
     }

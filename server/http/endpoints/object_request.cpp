@@ -316,7 +316,7 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<V
       co_return rr::make_error(rr::ErrorCode::object_not_found, rr::quote(name) + " is no object; nothing is below it");
     }
     std::optional<std::string> index;
-    if (member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none) {
+    if (member->is_indexed()) {
       if (++i == segments.size())
         co_return rr::make_error(rr::ErrorCode::object_not_found,
                                  "objref " + rr::quote(name) + " needs an index: .../" + name + "/INDEX");

@@ -188,7 +188,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     co_await writer.send(response);
     co_return;
   }
-  if (!member.parameters.empty() && member.parameters.back().type.container == rr::ContainerKind::generator) {
+  if (member.step_parameter()) {
     const auto response =
         problem_response(501, "the generator takes values while it runs, which HTTP can't; use a WebSocket");
     co_await writer.send(response);

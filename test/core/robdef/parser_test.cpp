@@ -80,6 +80,9 @@ TEST_CASE("a definition becomes its model", "[robdef]") {
   CHECK(ask->parameters[1].name == "list");
   CHECK(arm->find_member("scan")->is_generator());
   CHECK_FALSE(ask->is_generator());
+  REQUIRE(arm->find_member("scan")->step_parameter());
+  CHECK(arm->find_member("scan")->step_parameter()->name == "feed");
+  CHECK_FALSE(ask->step_parameter());
   CHECK(arm->find_member("moved")->parameters.empty());
   CHECK(arm->find_member("parts")->type.qualified_name == "demo.a.Arm");
   const auto* const mode = arm->find_member("mode");
