@@ -215,21 +215,14 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto device = destination.device ? destination.device->config().name : std::string();
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
-  SharedArrival arrival{
-      .from = {connection.client, connection.network, connection.identity.face},
-      .base_url = std::move(base_url),
-      .admit = make_admission(gateway, *destination.node, device, connection, rights, seating),
-      .enter = make_entrance(gateway, *destination.node, connection, rights),
-      .why_missing = explain_missing(gateway, connection, device),
-      .lock_rights = {
-          .admit =
-              [rights](auto path, const auto* user, bool is_asked) {
-                return rights->admit_lock(path, user, is_asked ? Recorded::each_time : Recorded::never);
-              },
-          .begin = [rights](const auto& wanted, const auto* user) { return rights->begin_lock(wanted, user); },
-          .has_role = [rights](auto role, const auto* user) { return rights->has_role(role, user); }},
-      .is_encrypted = connection.peer.is_encrypted,
-      .memory = gateway.memory().charge(connection.network)};
+  SharedArrival arrival{.from = {connection.client, connection.network, connection.identity.face},
+                        .base_url = std::move(base_url),
+                        .admit = make_admission(gateway, *destination.node, device, connection, rights, seating),
+                        .enter = make_entrance(gateway, *destination.node, connection, rights),
+                        .why_missing = explain_missing(gateway, connection, device),
+                        .lock_rights = rights,
+                        .is_encrypted = connection.peer.is_encrypted,
+                        .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   seating->session = session;
   connection.device = destination.device ? destination.device->shared_from_this() : nullptr;

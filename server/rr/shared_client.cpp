@@ -4,6 +4,8 @@
 #include <boost/asio/detached.hpp>
 
 #include "server/log/log.hpp"
+#include "server/rr/shared_access.hpp"
+#include "server/rr/shared_node.hpp"
 
 namespace rrgate {
 
@@ -20,11 +22,11 @@ const std::string& path_of(const rr::ServiceObject& object) {
 
 }  // namespace
 
-SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-                           std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-                           LockRights rights, std::string key)
-    : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
-      owner_(&owner),
+SharedClient::SharedClient(SharedNode& node, rr::ServiceSessionOptions options, std::unique_ptr<rr::ByteStream> stream,
+                           ClientOrigin from, MemoryBudget::Charge memory, std::shared_ptr<SessionRights> rights,
+                           std::string key)
+    : SessionDriver(std::move(stream), node.directory(), std::move(options), rr::read_clocks()),
+      node_(node),
       from_(std::move(from)),
       memory_(std::move(memory)),
       rights_(std::move(rights)),
@@ -74,11 +76,11 @@ void SharedClient::ended() {
   handle(rr::ClientGone{});
   // One that came when the client had left already, or was not let in.
   if (const auto unused = std::exchange(login_, nullptr)) unused->close();
-  owner_->client_ended(*this);
+  node_.client_ended(*this);
 }
 
 void SharedClient::handle(const rr::ClientConnected& connected) {
-  service_ = owner_->find_service(connected.service->name());
+  service_ = node_.find_service(connected.service->name());
   if (!service_) return;
   service_->add(*this);
   home_ = login_ ? login_ : service_->upstream();
@@ -302,7 +304,7 @@ void SharedClient::handle(const rr::CallbackCompleted& completed) {
 
 void SharedClient::answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result) {
   if (is_closed()) return;  // its node may be gone, too
-  const auto service = result ? owner_->find_service(login.attempt.service) : nullptr;
+  const auto service = result ? node_.find_service(login.attempt.service) : nullptr;
   if (service && (service->upstream()->is_resting() || !service->upstream()->has_tried())) {
     const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
     asio::co_spawn(executor(), answer_when_open(self, service->upstream(), login.id, std::move(*result)),
@@ -325,7 +327,7 @@ rr::awaitable<void> SharedClient::answer_when_open(std::shared_ptr<SharedClient>
 // --- logins: where the gateway has no users, the device judges them, by a session of this client's own ---
 
 void SharedClient::handle(const rr::LoginRequested& login) {
-  const auto service = service_ ? service_ : owner_->find_service(login.attempt.service);
+  const auto service = service_ ? service_ : node_.find_service(login.attempt.service);
   if (!service)
     return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
                                  rr::read_clocks());
@@ -334,7 +336,7 @@ void SharedClient::handle(const rr::LoginRequested& login) {
     const auto answer = [login, weak = std::weak_ptr(self)](const Logins::Judged& result) {
       if (const auto still_there = weak.lock()) still_there->answer_login(login, result);
     };
-    return owner_->logins().judge(login.attempt, from_, Logins::Of::session, answer);
+    return node_.logins().judge(login.attempt, from_, Logins::Of::session, answer);
   }
   // A login at the device adds no right here: who has none does not even get to try.
   if (!session_.admits(rr::EntryType::object_type_name, login.attempt.service, nullptr))
@@ -346,7 +348,7 @@ void SharedClient::handle(const rr::LoginRequested& login) {
 rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient> self,
                                                    std::shared_ptr<SharedService> service, rr::LoginRequested login) {
   if (self->is_closed()) co_return;
-  auto& logins = self->owner_->logins();
+  auto& logins = self->node_.logins();
   const DeviceLogin tried{login.attempt.username, service->device()->config().name, service->name(), self->from_};
   const auto ticket = logins.begin_at_device(tried);
   if (!ticket) {
@@ -411,18 +413,23 @@ rr::Result<> SharedClient::admit_lock(const rr::LockWanted& wanted) {
   const bool gives_back = wanted.command == rr::LockCommand::unlock ||
                           wanted.command == rr::LockCommand::exit_monitor ||
                           wanted.command == rr::LockCommand::release_lease;
-  if (!rights_.admit || (gives_back && home_->has_lock(*this, wanted.path))) return {};
-  return rights_.admit(wanted.path, session_.user(), wanted.command != rr::LockCommand::renew_lease);
+  if (!rights_ || (gives_back && home_->has_lock(*this, wanted.path))) return {};
+  const bool is_renewal = wanted.command == rr::LockCommand::renew_lease;
+  return rights_->admit_lock(wanted.path, session_.user(), is_renewal ? Recorded::never : Recorded::each_time);
 }
 
 bool SharedClient::may_lock(const std::string& path) const {
-  return !rights_.admit || rights_.admit(path, session_.user(), false).has_value();
+  return !rights_ || rights_->admit_lock(path, session_.user(), Recorded::never).has_value();
+}
+
+bool SharedClient::has_role(std::string_view role) const {
+  return rights_ && rights_->has_role(role, session_.user());
 }
 
 void SharedClient::begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done) {
   const bool is_recorded =
       wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;
-  const auto entry = rights_.begin && is_recorded ? rights_.begin(wanted, session_.user()) : nullptr;
+  const auto entry = rights_ && is_recorded ? rights_->begin_lock(wanted, session_.user()) : nullptr;
   home_->lock(*this, wanted, [entry, done = std::move(done)](const rr::Result<>& result) {
     if (entry) entry->finish(result);
     done(result);
@@ -442,11 +449,11 @@ void SharedClient::ask_for_lease(rr::LockCommand command, const std::string& pat
 }
 
 AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
-  if (!rights_.begin) return nullptr;
+  if (!rights_) return nullptr;
   rr::LockWanted end;
   end.command = rr::LockCommand::release_lease;
   end.path = path;
-  return rights_.begin(end, session_.user());
+  return rights_->begin_lock(end, session_.user());
 }
 
 void SharedClient::handle(const rr::LockWanted& wanted) {

@@ -16,34 +16,14 @@
 
 namespace rrgate {
 
-/// The node that a client is connected to.
-class SharedClientOwner {
- public:
-  /// Null: the service index.
-  virtual std::shared_ptr<SharedService> find_service(std::string_view name) const = 0;
-  virtual Logins& logins() = 0;
-  virtual void client_ended(SharedClient& client) = 0;
-
- protected:
-  ~SharedClientOwner() = default;
-};
-
-/// What a session asks the gateway's access about locks. `user`  who has logged in; null: nobody.
-struct LockRights {
-  /// Whether it may be done; none: it may. Errors   permission_denied. `is_asked`  by the client: refusals are
-  /// recorded.
-  std::function<rr::Result<>(std::string_view path, const rr::AuthenticatedUser* user, bool is_asked)> admit;
-  /// What is to be recorded of a lock, or of a lease's end (release_lease). None: nothing.
-  std::function<AuditEntryPtr(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user)> begin;
-  /// None: nobody has one.
-  std::function<bool(std::string_view role, const rr::AuthenticatedUser* user)> has_role;
-};
+class SessionRights;
+class SharedNode;
 
 class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
  public:
-  SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-               std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-               LockRights rights, std::string key);
+  /// `node`  that it is connected to. `rights`  to locks and leases; null: it has all, but no role.
+  SharedClient(SharedNode& node, rr::ServiceSessionOptions options, std::unique_ptr<rr::ByteStream> stream,
+               ClientOrigin from, MemoryBudget::Charge memory, std::shared_ptr<SessionRights> rights, std::string key);
 
   const rr::ServiceSession& session() const { return session_; }
   /// For logs.
@@ -102,9 +82,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   Subject lock_user() const override { return session_.user() ? subject_of(*session_.user()) : Subject(); }
-  bool has_role(std::string_view role) const override {
-    return rights_.has_role && rights_.has_role(role, session_.user());
-  }
+  bool has_role(std::string_view role) const override;
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
   bool may_lock(const std::string& path) const override;
   std::shared_ptr<Upstream> upstream_in_use() const override { return home_; }
@@ -143,10 +121,10 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
   std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
 
-  SharedClientOwner* owner_;
+  SharedNode& node_;
   ClientOrigin from_;
   MemoryBudget::Charge memory_;
-  LockRights rights_;
+  std::shared_ptr<SessionRights> rights_;
   std::string key_;
   std::string end_reason_;
   bool is_behind_ = false;

@@ -19,9 +19,8 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   const auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
   options.attributes.items.emplace_back(std::string(session_attribute), key);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
-  auto client =
-      std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.from),
-                                     std::move(arrival.memory), std::move(arrival.lock_rights), key);
+  auto client = std::make_shared<SharedClient>(*this, std::move(options), std::move(stream), std::move(arrival.from),
+                                               std::move(arrival.memory), std::move(arrival.lock_rights), key);
   clients_.emplace(client.get(), client);
   ended_.emplace(client.get(), std::move(ended));
   client->start();

@@ -22,12 +22,12 @@ struct SharedArrival {
   std::function<rr::Result<std::shared_ptr<rr::RequestPass>>(const rr::MemberAccess&)> enter;
   /// See ServiceSessionOptions.
   std::function<std::optional<rr::Error>(std::string_view service)> why_missing;
-  LockRights lock_rights;
+  std::shared_ptr<SessionRights> lock_rights;  ///< null: everything is allowed
   bool is_encrypted = false;
   MemoryBudget::Charge memory;  ///< what is held for it
 };
 
-class SharedNode final : public ServiceBoard, public SharedClientOwner {
+class SharedNode final : public ServiceBoard {
  public:
   /// `config` and `logins` outlive it.
   SharedNode(rr::NodeIdentity identity, const Config& config, Logins& logins)
@@ -48,16 +48,17 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
 
   /// The name of the device that a service is of; empty where there is no such service, or the index.
   std::string device_of(std::string_view service) const;
-  std::shared_ptr<SharedService> find_service(std::string_view name) const override;
+  /// Null: the service index.
+  std::shared_ptr<SharedService> find_service(std::string_view name) const;
+  Logins& logins() { return logins_; }
+  /// Called by a client of the node when it has ended.
+  void client_ended(SharedClient& client);
 
   std::shared_ptr<const rr::Authenticator> authenticator() const override { return logins_.authenticator(); }
   void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
   void withdraw(const rr::HostedService& hosted) override;
 
  private:
-  Logins& logins() override { return logins_; }
-  void client_ended(SharedClient& client) override;
-
   const Config& config_;
   Logins& logins_;
   rr::ServiceDirectory directory_;
