@@ -359,7 +359,7 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
   const auto wire = wires_.find({request.path, request.member});
   if (request.kind != SafeAction::Kind::wire || wire == wires_.end()) return;
   wire->second->out_value.reset();
-  if (connection_ && wire->second->is_attached)
+  if (connection_ && wire->second->state == AttachState::attached)
     (void)connection_->send_wire(request.path, request.member, request.values.front());
   else
     wire->second->out_value = OutValue{nullptr, request.values.front()};

@@ -115,8 +115,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// The same, but without clients for this time it rests: the device has no session to keep. Until the first client
   /// comes it is opened to see what there is, and rests at once.
   void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
-  bool is_resting() const { return is_resting_; }
-  bool is_attempting() const { return is_attempting_; }  ///< it is being opened
+  bool is_resting() const { return stage_ == Stage::resting; }
+  bool is_attempting() const { return stage_ == Stage::attempting; }  ///< it is being opened
   /// Whether it stays open though none of its own clients uses it.
   void hold(bool is_held);
   /// A client is about to come: opened again where it rests, and open for the whole time without clients from now on.
@@ -233,6 +233,15 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   using MemberKey = std::pair<std::string, std::string>;  // path, member
   using EndpointKey = std::pair<UpstreamClient*, rr::PipeId>;
 
+  /// Of one that is kept open; others wait all the time.
+  enum class Stage : std::uint8_t {
+    waiting,  ///< for the next attempt
+    attempting,
+    watched,  ///< it is open, and watch_use() waits
+    resting,
+  };
+  /// Of a wire or pipe, at the device.
+  enum class AttachState : std::uint8_t { detached, attaching, attached };
   struct Follower {
     UpstreamClient* client = nullptr;
     std::uint64_t count = 0;  ///< Wire::count of the newest that it was sent
@@ -264,17 +273,15 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::optional<Outgoing> outgoing;   ///< while hand_out() is at it
     std::uint64_t count = 0;            ///< values that have come
     std::optional<OutValue> out_value;  ///< the newest that could not be sent yet
-    bool is_attaching = false;
-    bool is_attached = false;
+    AttachState state = AttachState::detached;
     bool is_due = false;  ///< hand_out() is due
   };
-  enum class PipeState : std::uint8_t { detached, attaching, attached };
   struct Pipe {
     std::string path;
     rr::MemberDefinition member = {};  ///< a copy, as for wires
     std::vector<EndpointKey> endpoints;
     std::int32_t index = 0;
-    PipeState state = PipeState::detached;
+    AttachState state = AttachState::detached;
     bool has_sent = false;                                       ///< packets of its client are with the device
     bool is_held = false;                                        ///< a client is behind: the device hears nothing of it
     std::map<std::uint32_t, std::uint32_t> unacknowledged = {};  ///< number at the device -> that of the one client
@@ -371,12 +378,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::Result<> last_attempt_;  ///< to open it
   std::uint64_t attempts_ = 0;
   std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
-  bool is_attempting_ = false;
-  bool is_resting_ = false;
+  Stage stage_ = Stage::waiting;
   bool is_held_ = false;
-  bool is_wanted_ = false;   ///< a client has come, or was about to
-  bool is_waking_ = false;   ///< has rested, and the attempt to open it again is not over
-  bool is_watched_ = false;  ///< watch_use() waits
+  bool is_wanted_ = false;  ///< a client has come, or was about to
+  bool is_waking_ = false;  ///< has rested, and the attempt to open it again is not over
   bool is_closed_ = false;
   bool closes_unused_ = false;
   bool requires_user_ = false;

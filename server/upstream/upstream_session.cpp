@@ -135,7 +135,7 @@ void Upstream::close(std::function<void()> closed) {
   const auto reason = lost_error();
   std::vector<MemberKey> unanswered;  // wires whose clients wait for an answer, which does not come any more
   for (const auto& [key, wire] : wires_)
-    if (!wire->is_attached) unanswered.push_back(key);
+    if (wire->state != AttachState::attached) unanswered.push_back(key);
   for (const auto& key : unanswered) drop_wire(key, &reason);
   if (!connection) {
     if (closed) closed();
@@ -169,10 +169,11 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, std::function<
   rr::Backoff backoff(retry.min, retry.max);
   while (!self->is_closed_) {
     rr::Result<> done;
-    self->is_attempting_ = true;
+    self->stage_ = Stage::attempting;
     if (!self->is_open()) done = co_await self->open();
     if (done && is_used && !self->is_closed_) done = is_used();
-    self->is_attempting_ = self->is_waking_ = false;
+    self->stage_ = Stage::waiting;
+    self->is_waking_ = false;
     self->last_attempt_ = done;
     ++self->attempts_;
     self->attempted_.cancel();
@@ -180,9 +181,9 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, std::function<
     if (done) {
       log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
       const auto opened_at = std::chrono::steady_clock::now();
-      self->is_watched_ = true;
+      self->stage_ = Stage::watched;
       const bool may_rest = co_await self->watch_use();
-      self->is_watched_ = false;
+      self->stage_ = Stage::waiting;
       // A device that accepts and drops at once is as good as away.
       if (std::chrono::steady_clock::now() - opened_at >= lasting * retry.min) backoff.reset();
       if (may_rest) {
@@ -224,17 +225,17 @@ rr::awaitable<bool> Upstream::watch_use() {
 
 rr::awaitable<void> Upstream::rest() {
   disconnect_when_safe(std::exchange(connection_, nullptr));
-  is_resting_ = true;
+  stage_ = Stage::resting;
   wake_.expires_at(asio::steady_timer::time_point::max());
-  while (is_resting_ && !is_closed_) co_await wake_.async_wait(wait_token);
-  is_resting_ = false;
+  while (stage_ == Stage::resting && !is_closed_) co_await wake_.async_wait(wait_token);
+  stage_ = Stage::waiting;
 }
 
 void Upstream::wake() {
   is_wanted_ = true;
-  if (is_watched_) wake_.cancel();  // it does not rest just when the client comes
-  if (!is_resting_) return;
-  is_resting_ = false;
+  if (stage_ == Stage::watched) wake_.cancel();  // it does not rest just when the client comes
+  if (stage_ != Stage::resting) return;
+  stage_ = Stage::waiting;
   is_waking_ = true;
   wake_.cancel();
 }
@@ -242,16 +243,16 @@ void Upstream::wake() {
 void Upstream::hold(bool is_held) {
   is_held_ = is_held;
   if (is_held) wake();
-  if (is_watched_) wake_.cancel();
+  if (stage_ == Stage::watched) wake_.cancel();
 }
 
 void Upstream::retry_now() {
-  if (!is_open() && !is_attempting_ && !is_resting_) wake_.cancel();
+  if (!is_open() && stage_ == Stage::waiting) wake_.cancel();
 }
 
 rr::awaitable<rr::Result<>> Upstream::opened() {
   const auto self = shared_from_this();
-  if (is_open() && !is_attempting_) co_return rr::Result<>();
+  if (is_open() && !is_attempting()) co_return rr::Result<>();
   const auto before = attempts_;
   wake();
   wake_.cancel();
@@ -292,20 +293,21 @@ void Upstream::lost(const rr::Error& reason) {
   loss_ = reason;
   generators_.clear();
   for (const auto& [key, wire] : wires_) {
-    wire->is_attached = wire->is_attaching = false;
+    wire->state = AttachState::detached;
     wire->newest.reset();  // no value of before is one of now
     wire->outgoing.reset();
     for (auto& follower : wire->followers) follower.count = wire->count;
   }
   for (auto& [number, pipe] : pipes_) {
-    pipe.state = PipeState::detached;
+    pipe.state = AttachState::detached;
     pipe.is_held = false;
   }
   for_each_client([&](UpstreamClient& client) { end_sent_pipes(client); });
   locks_->handle_lost(*this);
   device_->note_trouble();
   tell_lost(lost_error());
-  if (is_watched_) wake_.cancel();  // else an attempt is over that has failed, or the next one waits for its time
+  // Else an attempt is over that has failed, or the next one waits for its time.
+  if (stage_ == Stage::watched) wake_.cancel();
 }
 
 void Upstream::tell_lost(const rr::Error& reason) {

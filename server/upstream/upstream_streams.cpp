@@ -36,7 +36,7 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
   if (!known) known = std::make_shared<Wire>(path, member);
   const auto wire = known;
   wire->followers.push_back({&client, wire->count});
-  if (wire->is_attached) {
+  if (wire->state == AttachState::attached) {
     client.answer_wire(path, member, {});
     const auto newest = wire->newest;
     if (!newest || !has_joined(client, key)) return;
@@ -49,7 +49,7 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
 
 void Upstream::attach_wire(const MemberKey& key) {
   const auto known = wires_.find(key);
-  if (!connection_ || known == wires_.end() || known->second->is_attached || known->second->is_attaching) return;
+  if (!connection_ || known == wires_.end() || known->second->state != AttachState::detached) return;
   // Who has joined may leave meanwhile, and another one join: that is another wire.
   const auto is_there = [weak = weak_from_this(), key,
                          wire = std::weak_ptr(known->second)]() -> std::shared_ptr<Upstream> {
@@ -58,12 +58,12 @@ void Upstream::attach_wire(const MemberKey& key) {
     const auto found = self->wires_.find(key);
     return found != self->wires_.end() && found->second == wire.lock() ? self : nullptr;
   };
-  known->second->is_attaching = true;
+  known->second->state = AttachState::attaching;
   if (!connection_->session().object_type(key.first))  // another session of this service has found it
     return find_object(key.first, [is_there, key](const rr::Result<rr::Value>& found) {
       const auto self = is_there();
       if (!self) return;
-      self->wires_.at(key)->is_attaching = false;
+      self->wires_.at(key)->state = AttachState::detached;
       if (found) return self->attach_wire(key);
       const auto reason = found.error();
       self->drop_wire(key, &reason);
@@ -80,7 +80,7 @@ void Upstream::attach_wire(const MemberKey& key) {
       return self->drop_wire(key, &reason);
     }
     const auto wire = self->wires_.at(key);
-    wire->is_attached = true;
+    wire->state = AttachState::attached;
     const auto followers = wire->followers;
     for (const auto& follower : followers)
       if (self->has_joined(*follower.client, key)) follower.client->answer_wire(key.first, wire->member, {});
@@ -181,7 +181,8 @@ rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path
   if (auto allowed = locks_->check_packet(client, path, member); !allowed) return allowed;
   const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return {};
-  if (connection_ && found->second->is_attached) return connection_->send_wire(path, member.name, value);
+  if (connection_ && found->second->state == AttachState::attached)
+    return connection_->send_wire(path, member.name, value);
   found->second->out_value = OutValue{&client, value};
   return {};
 }
@@ -205,7 +206,7 @@ void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::strin
       auto& pipe = pipes_.at(known->second);
       pipe.endpoints.push_back(endpoint);
       endpoints_[endpoint] = known->second;
-      if (pipe.state == PipeState::attached) client.accept_pipe(id);
+      if (pipe.state == AttachState::attached) client.accept_pipe(id);
       return;
     }
   }
@@ -221,7 +222,7 @@ void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::strin
 
 void Upstream::attach_pipe(PipeNumber number) {
   const auto found = pipes_.find(number);
-  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::detached) return;
+  if (found == pipes_.end() || !connection_ || found->second.state != AttachState::detached) return;
   auto& pipe = found->second;
   const auto weak = weak_from_this();
   if (!connection_->session().object_type(pipe.path))  // another session of this service has found it
@@ -231,7 +232,7 @@ void Upstream::attach_pipe(PipeNumber number) {
       if (object) return self->attach_pipe(number);
       self->drop_pipe(number);
     });
-  pipe.state = PipeState::attaching;
+  pipe.state = AttachState::attaching;
   rr::ClientConnection::PipeHandlers handlers;
   handlers.received = [weak, number](const rr::Value& packet) {
     const auto self = weak.lock();
@@ -284,7 +285,7 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
     return;
   }
   pipe.index = result->to<std::int32_t>().value();
-  pipe.state = PipeState::attached;
+  pipe.state = AttachState::attached;
   const auto endpoints = pipe.endpoints;
   for (const auto& endpoint : endpoints)
     if (endpoints_.contains(endpoint)) endpoint.first->accept_pipe(endpoint.second);
@@ -301,7 +302,7 @@ void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
   auto& pipe = found->second;
   std::erase(pipe.endpoints, endpoint);
   if (!pipe.endpoints.empty()) return pace_pipe(number);
-  if (connection_ && pipe.state == PipeState::attached)
+  if (connection_ && pipe.state == AttachState::attached)
     connection_->disconnect_pipe(pipe.path, pipe.member.name, pipe.index, ignore_result);
   if (pipe.member.direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member.name});
   pipes_.erase(found);
@@ -334,9 +335,9 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
   known = endpoints_.find(endpoint);  // a lease that has ended meanwhile had something sent: the session may be lost
   if (known == endpoints_.end()) return is_closed;
   auto& pipe = pipes_.at(known->second);
-  auto sent = !allowed                                           ? allowed
-              : pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
-                                                                 : rr::Result<>(lost_error());
+  auto sent = !allowed                                             ? allowed
+              : pipe.state == AttachState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
+                                                                   : rr::Result<>(lost_error());
   if (sent) return {};
   log(LogLevel::info, "pipe endpoint closed: its packet was not taken",
       {{"device", device_->config().name},
@@ -408,7 +409,7 @@ void Upstream::caught_up(UpstreamClient& client) {
 /// sending what a slow client could only be cut for.
 void Upstream::pace_pipe(PipeNumber number) {
   const auto found = pipes_.find(number);
-  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::attached) return;
+  if (found == pipes_.end() || !connection_ || found->second.state != AttachState::attached) return;
   auto& pipe = found->second;
   const bool is_held = std::any_of(pipe.endpoints.begin(), pipe.endpoints.end(),
                                    [](const EndpointKey& endpoint) { return endpoint.first->is_behind(); });
