@@ -159,7 +159,7 @@ Result<bool> Connection::handle_stream_entry(Now now) {
       done = answer_stream_op(entry, now);
       break;
     case EntryType::stream_op_ret:
-      done = handle_stream_op_reply(entry, now);
+      done = handle_stream_op_reply(entry);
       break;
     case EntryType::stream_check_capability:
       done = answer_capability(entry, now);
@@ -241,7 +241,7 @@ Result<> Connection::send_create_connection(Now now) {
   return send(request, now);
 }
 
-Result<> Connection::handle_stream_op_reply(const MessageEntry& entry, Now) {
+Result<> Connection::handle_stream_op_reply(const MessageEntry& entry) {
   if (role_ != ConnectionRole::client || state_ != ConnectionState::handshaking ||
       entry.member_name != create_connection)
     return {};  // late or not asked for

@@ -41,11 +41,9 @@ struct ConnectionOptions {
   bool is_encrypted = false;  ///< the stream is TLS already: a service refuses to start it again
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
-  std::size_t max_unauthorised_message_size = 512u * 1024;  ///< in force until authorise()
-  std::size_t max_unauthorised_queued_bytes = 64u * 1024;   ///< waiting for the stream: see is_held_back()
-  std::size_t max_queued_bytes = 64u * 1024 * 1024;         ///< a peer that reads slower than that is closed
-  std::chrono::milliseconds heartbeat_period{10'000};       ///< without sending or receiving anything
-  std::chrono::milliseconds receive_timeout{15'000};        ///< after an unanswered heartbeat
+  std::size_t max_queued_bytes = 64u * 1024 * 1024;    ///< a peer that reads slower than that is closed
+  std::chrono::milliseconds heartbeat_period{10'000};  ///< without sending or receiving anything
+  std::chrono::milliseconds receive_timeout{15'000};   ///< after an unanswered heartbeat
   std::chrono::milliseconds handshake_timeout{5'000};
 };
 
@@ -100,7 +98,7 @@ class Connection {
   Result<> send(SharedMessage& message, Now now, bool is_urgent = false, LentMessage* lent = nullptr);
   /// Clears `message` and addresses it to the peer's session: endpoints and the next message id.
   void begin_message(Message& message);
-  /// The size limit rises from max_unauthorised_message_size to max_message_size.
+  /// The size limit rises from 512 KiB to max_message_size.
   void authorise();
   void set_endpoints(std::uint32_t local, std::uint32_t remote);
   void close(Error reason);
@@ -125,17 +123,20 @@ class Connection {
   /// What waits for the stream, and what has come of a message that is not complete.
   std::size_t held_bytes() const { return queue_.held() + scanner_.held_bytes(); }
   /// Whether a peer that is not authorised leaves answers unread: it is to get no others before it has read those.
-  bool is_held_back() const { return !is_authorised_ && queue_.held() > options_.max_unauthorised_queued_bytes; }
+  bool is_held_back() const { return !is_authorised_ && queue_.held() > max_unauthorised_queued_bytes; }
   const ConnectionStats& stats() const { return stats_; }
 
  private:
+  static constexpr std::size_t max_unauthorised_message_size = 512u * 1024;  ///< in force until authorise()
+  static constexpr std::size_t max_unauthorised_queued_bytes = 64u * 1024;   ///< waiting for the stream
+
   Result<> handle_message(ByteSpan bytes, Now now);
   void fill_header();
   Result<> check_sender() const;
   Result<bool> handle_stream_entry(Now now);
   Result<> answer_stream_op(const MessageEntry& entry, Now now);
   Result<> answer_create_connection(const MessageEntry& entry, Now now);
-  Result<> handle_stream_op_reply(const MessageEntry& entry, Now now);
+  Result<> handle_stream_op_reply(const MessageEntry& entry);
   Result<> answer_capability(const MessageEntry& entry, Now now);
   Result<> answer_heartbeat(const MessageEntry& entry, Now now);
   Message begin_stream_reply(const MessageEntry& request) const;
@@ -144,7 +145,7 @@ class Connection {
   void address(MessageHeader& header);
   void complete_header(Message& message) const;
   std::size_t message_limit() const {
-    return is_authorised_ ? options_.max_message_size : options_.max_unauthorised_message_size;
+    return is_authorised_ ? options_.max_message_size : max_unauthorised_message_size;
   }
   EncodeOptions encode_options() const;
   Result<> note_sent(Now now);

@@ -288,10 +288,6 @@ void ClientConnection::on_callback_later(std::string_view path, std::string_view
       std::make_shared<LateCallbackHandler>(std::move(handler));
 }
 
-void ClientConnection::forget_callback(std::string_view path, std::string_view callback) {
-  callback_handlers_.erase({std::string(path), std::string(callback)});
-}
-
 HandlerRegistration ClientConnection::add_event_handler(std::string_view path, std::string_view event,
                                                         EventHandler handler, std::shared_ptr<bool> is_removed) {
   HandlerRegistration registration;

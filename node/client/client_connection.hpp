@@ -166,8 +166,6 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// As on_callback(), where the answer takes its time: `reply` is called once, on the thread of the io_context, also
   /// when the connection has ended. The service waits as long as it wants to.
   void on_callback_later(std::string_view path, std::string_view callback, LateCallbackHandler handler);
-  /// From now on the service hears that nobody answers.
-  void forget_callback(std::string_view path, std::string_view callback);
   /// One handler beside those that the event has already; they are called in the order of coming.
   /// `is_removed`  becomes true when the handler is taken out, for who wants to know.
   HandlerRegistration add_event_handler(std::string_view path, std::string_view event, EventHandler handler,

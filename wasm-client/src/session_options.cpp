@@ -104,7 +104,6 @@ Result<ClientOptions> read_session_options(const JsValue& js) {
   reader.read("credentials", options.credentials);
   reader.read("objectType", options.object_type);
   reader.read("connectTimeout", options.connect_timeout);
-  reader.read("requestTimeout", options.request_timeout);
 
   double version = 4;
   reader.read("version", version);

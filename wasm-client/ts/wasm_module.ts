@@ -18,7 +18,6 @@ export interface CoreOptions {
   version?: number | undefined;
   stringTable?: boolean | undefined;
   connectTimeout?: number | undefined;
-  requestTimeout?: number | undefined;
   maxMessageSize?: number | undefined;
   /** What known_definitions() of an earlier session gave, or []: definitions that the service need not send again. */
   known?: KnownDefinitions | undefined;

@@ -9,6 +9,8 @@ namespace rr {
 
 namespace {
 
+constexpr std::chrono::seconds callback_timeout{15};
+
 std::uint32_t request_id_of(CallbackId id) {
   return static_cast<std::uint32_t>(id);
 }
@@ -33,7 +35,7 @@ Result<CallbackId> ServiceSession::call_callback(std::string_view path, const Me
     if (connection_.state() == ConnectionState::closed) leave(sent.error(), now);
     return sent.error();
   }
-  callbacks_.emplace(id, OpenCallback{&member, now.steady + options_.callback_timeout});
+  callbacks_.emplace(id, OpenCallback{&member, now.steady + callback_timeout});
   return id;
 }
 

@@ -12,6 +12,7 @@ namespace rr {
 namespace {
 
 constexpr std::size_t max_open_locks = 64;
+constexpr std::size_t max_parked_requests = 64;  ///< for objects that are looked for
 
 /// Session operations that name no object.
 bool names_no_object(std::string_view command) {
@@ -104,12 +105,12 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
     return make_error(ErrorCode::object_not_found,
                       "path " + quote(entry.service_path) + " does not begin with this service");
   // A message is kept whole for each of its requests that waits.
-  if (message.entries.size() > options_.max_parked_requests)
+  if (message.entries.size() > max_parked_requests)
     return make_error(ErrorCode::out_of_system_resource,
                       "a message of " + std::to_string(message.entries.size()) +
                           " requests can't wait for its objects to be found, expected at most " +
-                          std::to_string(options_.max_parked_requests));
-  if (parked_.size() >= options_.max_parked_requests)
+                          std::to_string(max_parked_requests));
+  if (parked_.size() >= max_parked_requests)
     return make_error(
         ErrorCode::out_of_system_resource,
         std::to_string(parked_.size()) + " requests of this client wait for their objects to be found already");

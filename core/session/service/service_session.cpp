@@ -14,6 +14,7 @@ namespace {
 
 /// A closed session's last reply gets out before the connection closes.
 constexpr std::chrono::milliseconds linger{100};
+constexpr std::chrono::seconds endpoint_timeout{600};  ///< without a session message
 /// Others find room for theirs. What is forgotten of a remote service is found again where it is asked for.
 constexpr std::size_t max_kept_remote_objects = 1024;
 
@@ -86,7 +87,7 @@ void ServiceSession::handle_timeout(Now now) {
   handle_locks_changed(now);
   continue_late_locks(now);
   expire_callbacks(now);
-  const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
+  const bool is_late = service_ ? now.steady - last_session_message_ >= endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
   if (!is_late) return;
   const Error reason{ErrorCode::connection_error,
@@ -98,7 +99,7 @@ void ServiceSession::handle_timeout(Now now) {
 TimePoint ServiceSession::poll_timeout() const {
   if (wants_close()) return TimePoint::max();
   if (closing_deadline_) return *closing_deadline_;
-  const auto end = service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout;
+  const auto end = service_ ? last_session_message_ + endpoint_timeout : opened_ + options_.connect_timeout;
   const auto callback = callbacks_.empty() ? TimePoint::max() : callbacks_.begin()->second.deadline;
   auto lock = TimePoint::max();
   for (const auto& open : locks_) lock = std::min(lock, open.answer_by);
@@ -316,14 +317,14 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
     done = answer_session_op(message, entry, now);
   } else {
     begin_reply(entry);
-    done = answer_session_request(message, entry);
+    done = answer_session_request(entry);
     if (done) send_outgoing(now);
   }
   if (!done) send_error(entry, done.error(), now);
 }
 
 /// Requests to the session itself; the reply is begun.
-Result<> ServiceSession::answer_session_request(const Message& message, const MessageEntry& entry) {
+Result<> ServiceSession::answer_session_request(const MessageEntry& entry) {
   switch (entry.type) {
     case EntryType::client_keep_alive_req:
       return {};
@@ -341,7 +342,6 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
       return {};
     }
     default:
-      (void)message;
       return protocol_error("Unknown request type");
   }
 }

@@ -53,19 +53,16 @@ class RequestPass {
 struct ServiceSessionOptions {
   ConnectionOptions connection;  ///< `self` is taken from the directory
   std::string base_url = {};     ///< "rr+tcp://127.0.0.1:52222/": what the service index says of this connection
-  std::chrono::milliseconds connect_timeout{30'000};    ///< a connection that opens no session is closed
-  std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
+  std::chrono::milliseconds connect_timeout{30'000};  ///< a connection that opens no session is closed
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
   std::size_t max_open_calls = 1024;               ///< not answered yet; above, what the client sends has to wait
   std::size_t max_generators = 256;                ///< run by one client; above: out_of_system_resource
   std::uint32_t max_memory_transfer = 100 * 1024;  ///< bytes: how clients are told to split; not enforced
   std::size_t max_wires = 4096;                    ///< connected by one client; above: out_of_system_resource
-  std::chrono::milliseconds callback_timeout{15'000};
-  std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
-  std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
+  std::size_t max_open_callbacks = 1024;           ///< not answered yet; above: out_of_system_resource
+  std::size_t max_pipe_endpoints = 4096;           ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
-  std::size_t max_parked_requests = 64;                   ///< for objects of a remote service that are looked for
   /// Asked before anything is done with a member or a service is told of; what it refuses with is what the client gets.
   /// None: all is allowed.
   std::function<Result<>(const MemberAccess&)> admit = {};
@@ -338,7 +335,7 @@ class ServiceSession {
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);
-  Result<> answer_session_request(const Message& message, const MessageEntry& entry);
+  Result<> answer_session_request(const MessageEntry& entry);
   Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
   Result<> add_call(const Message& message, const MessageEntry& entry, CallKind kind, HostedService::Found found,
                     const MemberDefinition& member);
