@@ -6,7 +6,7 @@
 #include "server/gateway/gateway.hpp"
 #include "server/gateway/routes.hpp"
 #include "server/http/endpoints/access.hpp"
-#include "server/http/endpoints/objects.hpp"
+#include "server/http/endpoints/device_resources.hpp"
 #include "server/json/json.hpp"
 
 using namespace rrgate;

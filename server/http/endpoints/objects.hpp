@@ -1,19 +1,13 @@
 // The objects of devices over HTTP: GET, PUT, POST and streams. Layer: server/http/endpoints. See docs/http-api.md.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "server/http/router.hpp"
 #include "server/state/gateway_state.hpp"
 
 namespace rrgate {
-
-/// What is below a device and no service of it, the definitions "NAME.robdef" apart.
-inline constexpr std::array<std::string_view, 5> device_resources = {"subscriptions", "openapi.json", "asyncapi.json",
-                                                                     "thing-description.json", "types.d.ts"};
 
 /// A request that neither a rate nor a lack of memory holds up, as long as somebody may `verb` the service: it commands
 /// a member of a device that is urgent (LeaseConfig::is_urgent()), gives back a lease whose key it shows, or stops all
