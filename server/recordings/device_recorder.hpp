@@ -8,7 +8,7 @@
 
 #include "node/driver/backoff.hpp"
 #include "server/record/service_record.hpp"
-#include "server/upstream/value_client.hpp"
+#include "server/upstream/value_clients.hpp"
 
 namespace rrgate {
 

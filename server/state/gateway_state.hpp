@@ -27,7 +27,7 @@
 #include "server/state/http_access.hpp"
 #include "server/upstream/device.hpp"
 #include "server/upstream/found_devices.hpp"
-#include "server/upstream/value_client.hpp"
+#include "server/upstream/value_clients.hpp"
 
 namespace rrgate {
 

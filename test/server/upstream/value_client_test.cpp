@@ -1,5 +1,5 @@
 // Listeners of values: what they hear while a member of the device is joined, and when it ends.
-#include "server/upstream/value_client.hpp"
+#include "server/upstream/value_clients.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
 
