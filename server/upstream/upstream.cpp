@@ -5,7 +5,6 @@
 
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
-#include "core/support/glob.hpp"
 #include "node/client/unread_reply.hpp"
 
 namespace rrgate {
@@ -95,8 +94,8 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
     return;
   }
   ++clients_left_;
-  commands_.erase(&client);
-  std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
+  shared_reads_.forget(client);
+  callback_routes_.forget(client);
   for (;;) {  // the device may be lost with it, and end those of others
     const auto it = endpoints_.lower_bound({&client, 0});
     if (it == endpoints_.end() || it->first.first != &client) break;
@@ -314,14 +313,12 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
       self->request(client, called, done);
     });
   }
-  if (device_->config().shares_reads && use_of(called.kind) == MemberUse::command) commands_[&client] = ++last_step_;
+  if (device_->config().shares_reads && use_of(called.kind) == MemberUse::command) shared_reads_.note_command(client);
   if (called.generator != 0) return answer_generator(client, called, path, std::move(done));
   if (called.kind == rr::CallKind::function) {
-    const auto number = ++last_call_;
-    calls_.push_back({&client, path, number});
+    const auto number = callback_routes_.begin_call(client, path);
     done = [weak = weak_from_this(), number, done = std::move(done)](rr::Result<rr::Value> result) {
-      if (const auto self = weak.lock())
-        std::erase_if(self->calls_, [number](const OpenCall& call) { return call.number == number; });
+      if (const auto self = weak.lock()) self->callback_routes_.end_call(number);
       done(std::move(result));
     };
   }
@@ -384,33 +381,17 @@ void Upstream::send_safe(const SafeRequest& request, Completion done) {
   }
 }
 
-/// Whoever reads behind a command of its own hears what has come of that: no answer to what was asked before it.
-void Upstream::share_read(const UpstreamClient& client, const std::string& path, const std::string& property,
-                          Completion done) {
-  const MemberKey key(path, property);
-  const auto command = commands_.find(&client);
-  auto& newest = reads_[key];
-  if (newest && (command == commands_.end() || command->second < newest->begun))
-    return newest->readers.push_back(std::move(done));
-  const auto read = newest = std::make_shared<SharedRead>();
-  read->begun = ++last_step_;
-  read->readers.push_back(std::move(done));
-  connection_->get(path, property, [weak = weak_from_this(), key, read](const rr::Result<rr::Value>& value) {
-    const auto self = weak.lock();
-    if (!self) return;
-    if (const auto found = self->reads_.find(key); found != self->reads_.end() && found->second == read)
-      self->reads_.erase(found);
-    for (const auto& reader : read->readers) reader(value);
-  });
-}
-
 void Upstream::begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path,
                              Completion done) {
   const auto& name = called.member->name;
   switch (called.kind) {
     case rr::CallKind::property_get:
-      if (device_->config().shares_reads) return share_read(client, path, name, std::move(done));
-      return connection_->get(path, name, std::move(done));
+      if (!device_->config().shares_reads) return connection_->get(path, name, std::move(done));
+      if (const auto read = shared_reads_.join(client, {path, name}, std::move(done)))
+        connection_->get(path, name, [weak = weak_from_this(), read](const rr::Result<rr::Value>& value) {
+          if (const auto self = weak.lock()) self->shared_reads_.handle_answer(read, value);
+        });
+      return;
     case rr::CallKind::property_set:
       return connection_->set(path, name, called.arguments.front(), std::move(done));
     case rr::CallKind::function:
@@ -523,57 +504,23 @@ void Upstream::ask_for_lock(rr::LockCommand command, const std::string& path, st
 
 // --- callbacks ---
 
-/// Null where it could be several clients: it is not guessed who is asked, say, whether the robot may move.
-UpstreamClient* Upstream::owner_of_callback(const std::string& path,
-                                            const std::vector<UpstreamClient*>& candidates) const {
-  if (candidates.size() == 1) return candidates.front();
-  UpstreamClient* owner = nullptr;
-  for (const auto& call : calls_) {
-    if (call.path != path || std::find(candidates.begin(), candidates.end(), call.client) == candidates.end()) continue;
-    if (owner && owner != call.client) return nullptr;
-    owner = call.client;
-  }
-  return owner;
-}
-
 void Upstream::route_callback(const std::string& path, const rr::MemberDefinition& callback,
                               std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer) {
-  const auto name = path + "." + callback.name;
-  auto policy = CallbackPolicy::owner;
-  for (const auto& rule : device_->config().callbacks)
-    if (rr::glob_matches(rule.member, name)) {
-      policy = rule.policy;
-      break;
-    }
   std::vector<UpstreamClient*> candidates;
   for (auto* client : clients_)
     if (client->may_answer(path, callback)) candidates.push_back(client);
-  if (policy == CallbackPolicy::all && !candidates.empty()) {
-    struct Votes {
-      std::size_t left;
-      bool is_answered = false;
-    };
-    const auto votes = std::make_shared<Votes>(Votes{candidates.size()});
-    const auto take_vote = [votes, answer](const rr::Result<rr::Value>& vote) {
-      --votes->left;
-      if (votes->is_answered || (!vote && votes->left > 0)) return;
-      votes->is_answered = true;
-      answer(vote);
-    };
-    for (auto* client : candidates)  // one that is asked may end others
-      if (has(*client))
-        client->call_callback(path, callback, arguments, take_vote);
-      else
-        take_vote(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
-    return;
-  }
-  const bool is_first = policy == CallbackPolicy::first && !candidates.empty();
-  auto* client = is_first ? candidates.front() : owner_of_callback(path, candidates);
-  if (client) return client->call_callback(path, callback, arguments, answer);
-  answer(rr::make_error(
-      rr::ErrorCode::invalid_operation,
-      "Callback function not set: " + std::to_string(clients_.size()) +
-          " clients share this session and none of them is meant; \"callbacks\" of the device says who answers"));
+  const auto asked = callback_routes_.choose(device_->config().callbacks, path, callback.name, std::move(candidates));
+  if (asked.empty())
+    return answer(rr::make_error(
+        rr::ErrorCode::invalid_operation,
+        "Callback function not set: " + std::to_string(clients_.size()) +
+            " clients share this session and none of them is meant; \"callbacks\" of the device says who answers"));
+  const auto take_answer = first_value(asked.size(), answer);
+  for (auto* client : asked)  // one that is asked may end others
+    if (has(*client))
+      client->call_callback(path, callback, arguments, take_answer);
+    else
+      take_answer(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
 }
 
 }  // namespace rrgate

@@ -14,8 +14,10 @@
 #include "core/session/service/service_session.hpp"
 #include "node/client/client_connection.hpp"
 #include "server/access/identity.hpp"
+#include "server/upstream/callback_routes.hpp"
 #include "server/upstream/device.hpp"
 #include "server/upstream/service_locks.hpp"
+#include "server/upstream/shared_reads.hpp"
 
 namespace rrgate {
 
@@ -292,16 +294,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::string function;
     std::int32_t index = 0;
   };
-  /// A read that several clients wait for.
-  struct SharedRead {
-    std::uint64_t begun = 0;  ///< counts reads and commands
-    std::vector<Completion> readers;
-  };
-  struct OpenCall {
-    UpstreamClient* client = nullptr;
-    std::string path;
-    std::uint64_t number = 0;
-  };
 
   rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(std::string username,
                                                                                    bool is_stepwise);
@@ -332,7 +324,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// What this session knows of the objects at and below a path ends; its clients are told.
   void drop_objects(const std::string& path);
   void handle_released(const std::string& path);
-  void share_read(const UpstreamClient& client, const std::string& path, const std::string& property, Completion done);
   void begin_request(const UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
   void send_safe(const SafeRequest& request, Completion done);
   void answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
@@ -359,7 +350,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers);
   void route_callback(const std::string& path, const rr::MemberDefinition& callback,
                       std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer);
-  UpstreamClient* owner_of_callback(const std::string& path, const std::vector<UpstreamClient*>& candidates) const;
 
   std::shared_ptr<Device> device_;
   std::string service_;
@@ -400,12 +390,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::uint64_t endpoints_left_ = 0;  ///< how many ever have: while none does, nobody has to be looked up in endpoints_
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
-  std::vector<OpenCall> calls_;  ///< of functions, oldest first
-  // Where reads are shared:
-  std::map<MemberKey, std::shared_ptr<SharedRead>> reads_;   ///< the newest that others may join
-  std::map<const UpstreamClient*, std::uint64_t> commands_;  ///< when each client has commanded something last
-  std::uint64_t last_step_ = 0;
-  std::uint64_t last_call_ = 0;
+  CallbackRoutes callback_routes_;
+  SharedReads shared_reads_;
 };
 
 }  // namespace rrgate
