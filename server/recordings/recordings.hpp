@@ -18,6 +18,7 @@
 #include "server/limits/workers.hpp"
 #include "server/recordings/device_recorder.hpp"
 #include "server/recordings/recording_files.hpp"
+#include "server/upstream/device_registry.hpp"
 
 namespace rrgate {
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/rr/shared_node.hpp"
+#include "server/upstream/device_registry.hpp"
 
 namespace rrgate {
 

@@ -25,7 +25,7 @@
 #include "server/state/connection.hpp"
 #include "server/state/handshake_turns.hpp"
 #include "server/state/http_access.hpp"
-#include "server/upstream/device.hpp"
+#include "server/upstream/device_registry.hpp"
 #include "server/upstream/found_devices.hpp"
 #include "server/upstream/value_clients.hpp"
 

@@ -15,7 +15,7 @@
 #include "node/discovery/discovery.hpp"
 #include "server/config/config.hpp"
 #include "server/upstream/allow_rules.hpp"
-#include "server/upstream/device.hpp"
+#include "server/upstream/device_registry.hpp"
 
 namespace rrgate {
 

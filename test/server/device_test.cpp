@@ -1,5 +1,5 @@
 // A device of the gateway by itself: which of its URLs is taken, and how it stops.
-#include "server/upstream/device.hpp"
+#include "server/upstream/device_registry.hpp"
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
