@@ -10,6 +10,7 @@
 
 #include "core/session/connection.hpp"
 #include "core/support/random.hpp"
+#include "node/driver/post_cancel.hpp"
 #include "node/transport/race.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/service_locks.hpp"
@@ -127,7 +128,7 @@ rr::awaitable<rr::Result<T>> Device::until_stopped(rr::awaitable<rr::Result<T>> 
   const auto given_up = rr::make_error(rr::ErrorCode::operation_aborted, "given up: the device is not wanted any more");
   if (is_stopping_) co_return given_up;
   const auto executor = co_await asio::this_coro::executor;
-  const auto signal = dialing_.emplace(dialing_.end());
+  const auto signal = *dialing_.insert(std::make_shared<asio::cancellation_signal>()).first;
   auto token = asio::bind_cancellation_slot(signal->slot(), asio::as_tuple(asio::use_awaitable));
   auto [failure, result] = co_await asio::co_spawn(executor, std::move(work), std::move(token));
   dialing_.erase(signal);
@@ -314,7 +315,7 @@ void Device::look_again() {
 
 void Device::stop() {
   is_stopping_ = true;
-  for (auto& each : dialing_) each.emit(asio::cancellation_type::terminal);
+  for (const auto& each : dialing_) rr::post_cancel(executor(), each);
   wake_.cancel();
 }
 

@@ -1,9 +1,9 @@
 // A device behind the gateway: who it is and how it is. Layer: server/upstream.
 #pragma once
 
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <functional>
-#include <list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -154,9 +154,9 @@ class Device : public std::enable_shared_from_this<Device> {
   std::function<void()> on_change_;
   std::function<void(const LeaseNews&)> on_lease_;
   rr::DialOptions dial_options_;
-  std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
-  std::shared_ptr<TlsFiles> https_;                      ///< the same of HTTPS, which is around that
-  std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
+  std::shared_ptr<TlsFiles> tls_;                                        ///< null: the URL wants none
+  std::shared_ptr<TlsFiles> https_;                                      ///< the same of HTTPS, which is around that
+  std::set<std::shared_ptr<boost::asio::cancellation_signal>> dialing_;  ///< what stop() ends
   Retry retry_;
   std::chrono::milliseconds request_timeout_;
   rr::Backoff backoff_;             ///< between looks at it while it does not answer

@@ -7,6 +7,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "node/driver/post_cancel.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -100,7 +101,7 @@ void FoundDevices::note_change(const Discover& before, std::shared_ptr<TlsFiles>
 
 void FoundDevices::stop() {
   is_stopping_ = true;
-  for (auto& question : questions_) question.emit(asio::cancellation_type::terminal);
+  for (const auto& question : questions_) rr::post_cancel(io_.get_executor(), question);
   discovery_.reset();
   wake_.cancel();
 }
@@ -240,7 +241,7 @@ std::chrono::steady_clock::time_point FoundDevices::next_work() const {
 }
 
 void FoundDevices::begin_question(const rr::NodeId& id, std::vector<rr::ConnectionUrl> urls) {
-  const auto question = questions_.emplace(questions_.end());
+  const auto question = *questions_.insert(std::make_shared<asio::cancellation_signal>()).first;
   auto asked = ask(id, std::move(urls));
   asio::co_spawn(io_, std::move(asked),
                  asio::bind_cancellation_slot(question->slot(), [this, question](const std::exception_ptr&) {

@@ -4,10 +4,10 @@
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -88,7 +88,7 @@ class FoundDevices {
   std::optional<rr::Discovery> discovery_;
   std::map<rr::NodeId, Node> nodes_;
   std::vector<rr::NodeId> replaced_;  ///< by others at their place; discovery has not forgotten them yet
-  std::list<boost::asio::cancellation_signal> questions_;  ///< under way
+  std::set<std::shared_ptr<boost::asio::cancellation_signal>> questions_;  ///< under way
   std::size_t device_count_ = 0;
   bool is_full_ = false;
   bool is_stopping_ = false;

@@ -82,6 +82,25 @@ TEST_CASE("a device that hangs while it is dialed stops at once, for its clients
   CHECK(failure->code == rr::ErrorCode::operation_aborted);
 }
 
+TEST_CASE("a device may be stopped between any two turns of its loop while it is dialed") {
+  boost::asio::io_context io;
+  tcp::acceptor closed(io, {boost::asio::ip::address_v4::loopback(), 0});
+  const auto url =
+      rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(closed.local_endpoint().port()) + "/?service=x");
+  closed.close();  // who dials there fails in a few turns
+  for (int turns = 0; turns < 60; ++turns) {
+    Watched watched(url.value());
+    watched.start();
+    bool has_ended = false;
+    boost::asio::co_spawn(watched.io, watched.device->connect(),
+                          [&](const std::exception_ptr&, const auto&) { has_ended = true; });
+    for (int turn = 0; turn < turns; ++turn) watched.io.poll_one();
+    watched.device->stop();
+    CHECK(watched.run_out() < seconds(5));
+    CHECK(has_ended);
+  }
+}
+
 TEST_CASE("found devices and pages follow what a reload says of all devices") {
   boost::asio::io_context io{1};
   Config config;
