@@ -31,8 +31,8 @@ struct Generator {
   std::function<Result<std::optional<Value>>(const Value& parameter)> next;
   /// The client needs no more.
   std::function<void()> close = {};
-  /// The client wants it to stop at once, or has gone, or has not asked for ten minutes. Also while a value is waited
-  /// for.
+  /// The client wants it to stop at once, or has gone, or has not asked for ten minutes, or its object was replaced.
+  /// Also while a value is waited for: the client does not get that any more.
   std::function<void()> abort = {};
   /// Instead of `next` where that takes its time: `call` is answered with the value, with the error stop_iteration at
   /// the end, or with another one.

@@ -11,7 +11,8 @@
 // from any thread. None of them keeps anybody waiting but the client that called; answers go out as they come.
 //
 // When the client goes, a coroutine is cancelled by its cancellation slot, a blocking handler that has not begun never
-// does, and answers are dropped. The destructor of a node waits for blocking handlers that run.
+// does, and answers are dropped. The coroutine of a generator is cancelled also when its client aborts it or its object
+// is replaced. The destructor of a node waits for blocking handlers that run.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -160,11 +160,7 @@ std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
   }
   if (is_next) return take_step(called);
   const auto ended = generators_.extract(found);
-  for (const auto& [id, late] : late_calls_)
-    if (late.generator == called.generator)
-      if (const auto call = late.call.lock()) call->cancel();
-  for (const auto& waiting : ended.mapped().waiting)
-    session_.reply(waiting.id, make_error(ErrorCode::operation_aborted, "the generator was aborted"), read_clocks());
+  abort_steps(called.generator, ended.mapped(), "the generator was aborted");
   const auto& generator = *ended.mapped().generator;
   if (const auto& handler = called.kind == CallKind::generator_close ? generator.close : generator.abort) handler();
   return Value{};
@@ -197,11 +193,24 @@ void ServiceClient::abandon_generator(const Generator& generator) {
   if (generator.abort) notify("a generator's", "abort", generator.abort);
 }
 
-void ServiceClient::handle(const GeneratorEnded& ended, Now now) {
+/// The client is answered at once, whatever the handler of the step that is under way still does.
+void ServiceClient::abort_steps(GeneratorId id, const RunningGenerator& ended, const char* why) {
+  const Now now = read_clocks();
+  const auto error = make_error(ErrorCode::operation_aborted, why);
+  std::erase_if(late_calls_, [&](const auto& each) {
+    const auto& [call_id, late] = each;
+    if (late.generator != id) return false;
+    session_.reply(call_id, error, now);
+    if (const auto call = late.call.lock()) call->cancel();
+    return true;
+  });
+  for (const auto& waiting : ended.waiting) session_.reply(waiting.id, error, now);
+}
+
+void ServiceClient::handle(const GeneratorEnded& ended, Now) {
   const auto left = generators_.extract(ended.id);
   if (!left) return;
-  for (const auto& called : left.mapped().waiting)
-    session_.reply(called.id, make_error(ErrorCode::operation_aborted, "the generator has ended"), now);
+  abort_steps(ended.id, left.mapped(), "the generator has ended");
   abandon_generator(*left.mapped().generator);
 }
 

@@ -66,6 +66,12 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   /// Reports what could not be sent on a connection that goes on.
   void note_sent(const MemberDefinition& member, const Result<>& sent);
 
+  struct RunningGenerator {
+    std::shared_ptr<const Generator> generator;
+    bool is_stepping = false;          ///< a step answers later
+    std::vector<Called> waiting = {};  ///< what the client asks of it meanwhile
+  };
+
   void handle(Called& called, Now now);
   std::shared_ptr<LateCall> begin_late_call(const Called& called);
   void finish_late_call(CallId id, const Result<Value>& answer);
@@ -74,6 +80,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   std::optional<Result<Value>> answer_generator(Called& called);
   Result<Value> take_step(const Called& called);
   void finish_step(GeneratorId id, bool has_failed);
+  void abort_steps(GeneratorId id, const RunningGenerator& ended, const char* why);
   /// Tells a generator that nobody will ask it any more.
   void abandon_generator(const Generator& generator);
   void handle(const ClientConnected& connected, Now now);
@@ -115,11 +122,6 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   std::shared_ptr<Service> service_;
   std::set<PathMember, PathMemberLess> wires_;  ///< that it follows
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
-  struct RunningGenerator {
-    std::shared_ptr<const Generator> generator;
-    bool is_stepping = false;          ///< a step answers later
-    std::vector<Called> waiting = {};  ///< what the client asks of it meanwhile
-  };
   std::unordered_map<GeneratorId, RunningGenerator> generators_;  ///< as many as the session allows
   /// Requests whose handlers answer later.
   struct Late {

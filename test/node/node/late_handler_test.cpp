@@ -20,6 +20,10 @@ namespace {
 
 constexpr const char* definition = R"(service test.patient
 stdver 0.10
+object Nurse
+    function int32{generator} count(int32 last)
+    function int32{generator} count_blocking(int32 last)
+end
 object Patient
     property double level
     function int32 quick(int32 number)
@@ -33,6 +37,7 @@ object Patient
     function int32{generator} count_blocking(int32 last)
     wire double both
     memory uint8[] cells
+    objref Nurse nurse
 end
 )";
 
@@ -81,6 +86,7 @@ struct Patient {
   std::promise<void> cancelled;
   double level = 1;
   std::shared_ptr<Service> service = Service::from_text({definition}, "Patient", "Patient");
+  std::shared_ptr<Object> nurse;  ///< counts, too
 
   explicit Patient(Node* node)
       : timer(std::make_unique<asio::steady_timer>(node->io_context(), asio::steady_timer::time_point::max())) {
@@ -116,21 +122,27 @@ struct Patient {
     service->function("ask_later",
                       [this](std::int32_t, Reply<std::int32_t> reply) { replies.push_back(std::move(reply)); });
     service->function("drop", [](const Reply<void>&) {});
-    service->generator("count", [this](std::int32_t last) {
+    const auto count = [this](std::int32_t last) {
       return [this, last, next = 0]() mutable -> asio::awaitable<std::optional<std::int32_t>> {
         if (next == 1) co_await timer->async_wait(asio::as_tuple(asio::use_awaitable));
         if (next == last) co_return std::nullopt;
         co_return next++;
       };
-    });
-    service->generator("count_blocking", [this](std::int32_t last) {
+    };
+    const auto count_blocking = [this](std::int32_t last) {
       return blocking([this, last, next = 0]() mutable -> std::optional<std::int32_t> {
         if (next == 1) gate.wait();
         if (next == 3) throw std::runtime_error("too many");
         if (next == last) return std::nullopt;
         return next++;
       });
-    });
+    };
+    nurse = service->make_object("Nurse");
+    service->objref("nurse", [this] { return nurse; });
+    for (auto* object : {&service->root(), nurse.get()}) {
+      object->generator("count", count);
+      object->generator("count_blocking", count_blocking);
+    }
     MemoryHandlers cells;
     cells.dimensions = [] { return MemoryShape{4}; };
     cells.read = [this](const MemoryRange& range) {
@@ -314,6 +326,11 @@ struct Steps {
     };
     return object.connection().run_until(has_all, 10s);
   }
+  bool are_aborted() const {
+    return std::all_of(results.begin(), results.end(), [](const auto& result) {
+      return result->has_error() && result->error().code == ErrorCode::operation_aborted;
+    });
+  }
 };
 
 }  // namespace
@@ -347,8 +364,30 @@ TEST_CASE("a generator that waits is aborted at once, and what was asked of it f
     connection.abort_generator(one.path(), "count", steps.index, std::move(done));
   });
   REQUIRE(steps.wait());
-  CHECK(steps.results[1]->error().code == ErrorCode::operation_aborted);
+  CHECK(steps.are_aborted());
   CHECK(one.call("quick", 1) == Value(1));
+}
+
+TEST_CASE("a generator that waits ends at once when its object is replaced, which it lets go") {
+  const std::string function = GENERATE("count", "count_blocking");
+  PatientNode device;
+  const auto one = device.connect();
+  Steps steps(one.object("nurse"), function, 2);
+  CHECK(steps.next() == Value(0));
+  steps.ask();
+  REQUIRE(one.call("quick", 1) == Value(1));
+  const std::weak_ptr<Object> replaced = device.patient->nurse;
+  device.ask([&] {
+    device.patient->nurse.reset();
+    device.patient->service->root().release("nurse");
+  });
+  REQUIRE(steps.wait());
+  CHECK(steps.are_aborted());
+  device.patient->gate.open();  // one that blocks can't be cancelled
+  const auto end = std::chrono::steady_clock::now() + 10s;
+  while (!replaced.expired() && std::chrono::steady_clock::now() < end) REQUIRE(one.call("quick", 1) == Value(1));
+  CHECK(replaced.expired());
+  CHECK(device.patient->reported().empty());
 }
 
 TEST_CASE("what handlers throw later reaches the client, and mistakes are reported") {
