@@ -30,20 +30,25 @@ void MonitorLocks::hand_on(Monitor& monitor, Now now) {
 
 MonitorLocks::Monitor* MonitorLocks::find(const ServiceObject& object, Now now) {
   const auto found = monitors_.find(&object);
-  if (found == monitors_.end()) return nullptr;
+  if (found == monitors_.end() || found->second.object.expired()) return nullptr;
   hand_on(found->second, now);
   return &found->second;
 }
 
 Result<MonitorLocks::State> MonitorLocks::enter(const std::shared_ptr<ServiceObject>& object, SessionId session,
                                                 std::chrono::milliseconds timeout, Now now) {
-  if (!monitors_.contains(object.get()) && monitors_.size() >= max_monitors) {
-    std::erase_if(monitors_, [](const auto& item) { return item.second.owner == 0 && item.second.queue.empty(); });
+  auto* known = find(*object, now);
+  if (!known) {
+    if (monitors_.size() >= max_monitors)
+      std::erase_if(monitors_, [](const auto& item) {
+        const auto& [address, each] = item;
+        return each.object.expired() || (each.owner == 0 && each.queue.empty());
+      });
     if (monitors_.size() >= max_monitors)
       return make_error(ErrorCode::out_of_system_resource, "too many objects are monitor locked");
+    known = &monitors_.insert_or_assign(object.get(), Monitor{object}).first->second;
   }
-  auto& monitor = monitors_.try_emplace(object.get(), Monitor{object}).first->second;
-  hand_on(monitor, now);
+  auto& monitor = *known;
   const bool is_waiting = std::any_of(monitor.queue.begin(), monitor.queue.end(),
                                       [&](const Waiting& waiting) { return waiting.session == session; });
   if (monitor.owner == session || is_waiting) return invalid("Already acquiring or acquired monitor lock");

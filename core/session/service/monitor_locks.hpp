@@ -14,7 +14,8 @@ namespace rr {
 class ServiceObject;
 
 /// Who is in which object's monitor and who waits for it, first come, first served. Time is a parameter: an owner that
-/// does nothing with the object for 30 s has lost it, which is found out when somebody looks.
+/// does nothing with the object for 30 s has lost it, which is found out when somebody looks. Monitors keep no objects:
+/// that of one that has gone is never found again, and makes room.
 class MonitorLocks {
  public:
   enum class State : std::uint8_t { owned, waiting };
@@ -49,7 +50,7 @@ class MonitorLocks {
     TimePoint deadline;
   };
   struct Monitor {
-    std::shared_ptr<ServiceObject> object;  ///< kept: its address is the key
+    std::weak_ptr<ServiceObject> object;  ///< once it has gone, its address, the key, may be that of another
     SessionId owner = 0;
     TimePoint idle_deadline = {};
     std::deque<Waiting> queue = {};

@@ -394,6 +394,17 @@ TEST_CASE("a monitor that comes free between two turns is taken by the next") {
   CHECK(why(all.get(first)).substr(0, 2) == "17");
 }
 
+TEST_CASE("an object that was replaced goes, though its monitor was entered") {
+  Clients all;
+  auto& first = all.add("");
+  CHECK(all.get(first, "name", "arm.tool"));
+  CHECK(all.ask(first, first.client->enter_monitor("arm.tool", std::chrono::milliseconds(-1), all.now())));
+  CHECK(all.ask(first, first.client->exit_monitor("arm.tool", all.now())));
+  const std::weak_ptr<ServiceObject> tool = all.service().find_object("arm.tool").value().object;
+  all.service().forget_path("arm.tool");
+  CHECK(tool.expired());
+}
+
 TEST_CASE("a wait for a monitor has an end") {
   Clients all;
   auto& first = all.add("");

@@ -42,6 +42,30 @@ TEST_CASE("so many objects can be monitor locked, and further ones when others a
   CHECK(monitors.locks.exit(*objects[0], 1, monitors.now));
   CHECK(monitors.enter(late, 1).value() == MonitorLocks::State::owned);
   CHECK(monitors.enter(Monitors::object(), 1).error().code == ErrorCode::out_of_system_resource);
+  objects[1].reset();
+  CHECK(monitors.enter(Monitors::object(), 1).value() == MonitorLocks::State::owned);
+}
+
+TEST_CASE("an object goes whether or not its monitor was entered, and one at its address has a monitor of its own") {
+  Monitors monitors;
+  PlainObject place("experimental.loopback.Arm");
+  const auto object_there = [&] { return std::shared_ptr<ServiceObject>(&place, [](ServiceObject*) {}); };
+  auto object = object_there();
+  const std::weak_ptr<ServiceObject> first = object;
+  CHECK(monitors.enter(object, 1).value() == MonitorLocks::State::owned);
+  SECTION("left") {
+    CHECK(monitors.locks.exit(*object, 1, monitors.now).value());
+  }
+  SECTION("still owned, and waited for") {
+    CHECK(monitors.enter(object, 2).value() == MonitorLocks::State::waiting);
+  }
+  object.reset();
+  CHECK(first.expired());
+  object = object_there();
+  CHECK(monitors.locks.check(*object, 3, monitors.now));
+  CHECK_FALSE(monitors.locks.exit(*object, 3, monitors.now).value());  // it was never locked
+  CHECK(monitors.enter(object, 3).value() == MonitorLocks::State::owned);
+  CHECK_FALSE(monitors.locks.has_waiting());
 }
 
 TEST_CASE("so many clients can wait for a monitor, and further ones when others have left") {
