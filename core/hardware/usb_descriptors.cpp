@@ -59,7 +59,7 @@ Result<std::uint16_t> parse_usb_bos_header(ByteSpan bytes) {
   return total;
 }
 
-Result<std::optional<UsbFunction>> parse_usb_bos(ByteSpan bytes) {
+Result<UsbFunction> parse_usb_bos(ByteSpan bytes) {
   const auto total = parse_usb_bos_header(bytes);
   if (!total) return total.error();
   if (bytes.size() < *total) return bad("BOS length", bytes.size(), std::to_string(*total));
@@ -71,9 +71,9 @@ Result<std::optional<UsbFunction>> parse_usb_bos(ByteSpan bytes) {
     if (rest[0] != our_capability_size) return bad("Robot Raconteur capability bLength", rest[0], "24");
     if (const auto version = load16(rest, 20); version != our_version)
       return bad_code("Robot Raconteur capability version", version, our_version);
-    return std::optional(UsbFunction{rest[22], rest[23]});
+    return UsbFunction{rest[22], rest[23]};
   }
-  return std::optional<UsbFunction>();
+  return make_error(ErrorCode::node_not_found, "USB BOS descriptor: no Robot Raconteur capability");
 }
 
 Result<UsbPipes> find_usb_pipes(std::span<const UsbInterface> interfaces, std::uint8_t number) {

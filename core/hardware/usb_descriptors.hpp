@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,9 +23,9 @@ inline constexpr std::size_t usb_bos_header_size = 5;
 /// wTotalLength of a BOS, from its first five bytes. Errors   protocol_error.
 Result<std::uint16_t> parse_usb_bos_header(ByteSpan bytes);
 /// Looks for Robot Raconteur's platform capability.
-/// Returns  nullopt when the device has none.
-/// Errors   protocol_error: a broken BOS, or a capability of another length or version.
-Result<std::optional<UsbFunction>> parse_usb_bos(ByteSpan bytes);
+/// Errors   node_not_found: the device has none; protocol_error: a broken BOS, or a capability of another length or
+/// version.
+Result<UsbFunction> parse_usb_bos(ByteSpan bytes);
 
 struct UsbEndpoint {
   std::uint8_t address = 0;  ///< highest bit: IN

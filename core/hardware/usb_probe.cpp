@@ -65,8 +65,7 @@ Result<> UsbProbe::handle_answer(ByteSpan data) {
     case Step::bos: {
       const auto function = parse_usb_bos(data);
       if (!function) return function.error();
-      if (!*function) return protocol_error("USB BOS descriptor: no Robot Raconteur capability");
-      info_.function = **function;
+      info_.function = *function;
       ask_block(Step::block_header, usb_block_header_size);
       return {};
     }

@@ -29,7 +29,11 @@ class UsbProbe {
   /// The next request; nullptr when there is a result. The same one until it is answered.
   const UsbControl* poll_control() const { return result_ ? nullptr : &next_; }
 
-  /// Errors   connection_error: a request failed; protocol_error: not a device of ours, or a broken one.
+  /// The device is one of ours: its BOS says so.
+  bool has_function() const { return step_ > Step::bos; }
+
+  /// Errors   node_not_found: not a device of ours; connection_error: a request failed; protocol_error: it breaks a
+  /// rule.
   const std::optional<Result<UsbNodeInfo>>& result() const { return result_; }
 
  private:

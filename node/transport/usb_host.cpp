@@ -61,6 +61,12 @@ void UsbHost::shutdown() {
   scanned_.reset();
 }
 
+void UsbHost::Known::settle(Result<UsbNodeInfo> answer) {
+  if (!answer && answer.error().code != ErrorCode::node_not_found)
+    problem = device.description() + ": " + answer.error().message;
+  probed = std::move(answer);
+}
+
 /// A context of its own for each look: one that is older hears of new devices from udev only, which containers lack.
 Result<> UsbHost::look() {
   auto context = UsbContext::make(*executor_);
@@ -85,11 +91,11 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
   std::optional<UsbFunction> function;
   if (const auto bos = read_bos(known->device); !bos.empty()) {
     const auto parsed = parse_usb_bos(bos);
-    if (!parsed || !*parsed) {
-      known->probed = parsed ? protocol_error("no Robot Raconteur capability") : parsed.error();
+    if (!parsed) {
+      known->settle(parsed.error());
       co_return;
     }
-    function = **parsed;
+    function = *parsed;
   }
   UsbHandle::Opened opened;
   asio::steady_timer timer(executor);
@@ -123,15 +129,21 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
       known->problem = open_problem(known->device, answer->status);
       co_return;
     }
+    if (answer->status == UsbStatus::stall && !probe.has_function()) {
+      known->settle(make_error(ErrorCode::node_not_found, "no BOS descriptor"));
+      co_return;
+    }
     probe.handle_control(answer->status, answer->data);
   }
-  known->probed = *probe.result();
-  if (!*known->probed) co_return;
-  const auto pipes = find_usb_pipes(known->device.interfaces, (*known->probed)->function.interface);
-  if (pipes)
-    known->pipes = *pipes;
-  else
-    known->probed = pipes.error();
+  auto answer = *probe.result();
+  if (answer) {
+    const auto pipes = find_usb_pipes(known->device.interfaces, answer->function.interface);
+    if (pipes)
+      known->pipes = *pipes;
+    else
+      answer = pipes.error();
+  }
+  known->settle(std::move(answer));
 }
 
 awaitable<UsbHost::Found> UsbHost::scan() {
@@ -188,7 +200,7 @@ awaitable<Result<std::unique_ptr<ByteStream>>> UsbHost::dial(std::function<bool(
     std::string seen;
     for (const auto& node : found.nodes)
       seen += "; found " + quote(node.name) + " " + format_node_id(node.id) + " at " + node.device;
-    for (const auto& problem : found.problems) seen += "; not asked: " + problem;
+    for (const auto& problem : found.problems) seen += "; not usable: " + problem;
     co_return make_error(ErrorCode::connection_error,
                          "no such node on USB" + (seen.empty() ? "; no device found" : seen));
   }

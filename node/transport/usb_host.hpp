@@ -31,7 +31,7 @@ class UsbHost final : public boost::asio::execution_context::service {
   };
   struct Found {
     std::vector<Node> nodes;
-    /// Devices that may be nodes but could not be asked, and why; a missing permission, mostly.
+    /// Devices that may be nodes but can't be used, and why: a missing permission, or what is wrong with their answers.
     std::vector<std::string> problems;
   };
   /// Looks at what is plugged in; devices are asked who they are when they are new, or could not be asked before.
@@ -46,9 +46,12 @@ class UsbHost final : public boost::asio::execution_context::service {
     UsbDevice device;
     UsbPipes pipes;
     std::optional<Result<UsbNodeInfo>> probed;  ///< none: not asked yet, or worth asking again
-    std::string problem;                        ///< the device could not be asked
+    std::string problem;                        ///< why the device can't be used; empty: it can, or is not one of ours
     bool is_present = false;
     std::weak_ptr<UsbClaim> claim;
+
+    /// It has said what it is.
+    void settle(Result<UsbNodeInfo> answer);
   };
 
   void shutdown() override;

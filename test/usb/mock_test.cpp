@@ -18,6 +18,7 @@ using namespace rr;
 using namespace rr::test;
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
+using Catch::Matchers::EndsWith;
 
 namespace {
 
@@ -107,6 +108,17 @@ TEST_CASE("only what may be a node is opened; what then fails is said") {
   CHECK(found.nodes.empty());
   REQUIRE(found.problems.size() == 1);
   CHECK(found.problems[0].find("(1209:5252): ") != std::string::npos);
+  // And this one says by its BOS, which is asked for once, that it is ours, but breaks a rule.
+  auto longer = usb_bos(0, 0xBA);
+  longer[2] = 37;
+  longer[12] = 25;
+  longer.push_back(0);
+  machine.plug_in(7, SimulatedDevice(), longer);
+  for (int times = 0; times < 2; ++times) {
+    const auto problems = scan(io).problems;
+    REQUIRE(problems.size() == 2);
+    CHECK_THAT(problems[1], EndsWith("(1209:5252): USB Robot Raconteur capability bLength: found 25, expected 24"));
+  }
 }
 
 TEST_CASE("a watch looks again soon after the system tells of a device, and only of those that matter") {

@@ -35,8 +35,8 @@ TEST_CASE("a BOS tells interface and vendor code, wherever the capability stands
   REQUIRE(alone);
   CHECK(*alone == UsbFunction{0, 0xBA});
   const auto none = parse_usb_bos(from_hex("05 0f 0c00 01  07 10 02 00000000"));
-  REQUIRE(none);
-  CHECK_FALSE(none->has_value());
+  REQUIRE_FALSE(none);
+  CHECK(none.error().code == ErrorCode::node_not_found);
 }
 
 TEST_CASE("a BOS cut anywhere or with broken lengths is refused, never read beyond") {

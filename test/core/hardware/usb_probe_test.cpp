@@ -89,6 +89,7 @@ TEST_CASE("a device that is not ours or breaks a rule is refused, with the reaso
   SECTION("a BOS without our capability") {
     device.replace_bos(from_hex("05 0f 0c00 01  07 10 02 00000000"));
     CHECK(refusal(probe(device)) == "USB BOS descriptor: no Robot Raconteur capability");
+    CHECK(probe(device).error().code == ErrorCode::node_not_found);
   }
   SECTION("the second answer is shorter than the block") {
     device.replace_block(from_hex("0800 0000 0001 1700 0e00 0100 0000 0001 04 05 0100 0101"));
@@ -110,6 +111,7 @@ TEST_CASE("a device that is not ours or breaks a rule is refused, with the reaso
   SECTION("a string is missing") {
     device.replace_block(from_hex("0800 0000 0001 1600 0e00 0100 0000 0001 04 09 0100 0101"));
     CHECK(refusal(probe(device)) == "USB NodeName string: refused by the device (stall)");
+    CHECK(probe(device).error().code == ErrorCode::connection_error);
   }
   SECTION("the device vanishes") {
     device.unplug();
@@ -128,6 +130,7 @@ TEST_CASE("a probe ends at whichever request fails") {
     REQUIRE(probe.poll_control());
     probe.handle_control(UsbStatus::timed_out, {});
     CHECK_FALSE(probe.poll_control());
+    CHECK(probe.has_function() == (step >= 2));
     REQUIRE(probe.result());
     CHECK(probe.result()->error().code == ErrorCode::connection_error);
     CHECK(probe.result()->error().message.find("no answer in time") != std::string::npos);
