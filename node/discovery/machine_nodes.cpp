@@ -37,7 +37,9 @@ MachineNodes::MachineNodes(const boost::asio::any_io_executor& executor, const M
         if (!node.id.is_any()) news.push_back({node.id, node.name, node.url, ""});  // others can be dialed by name
       tell(hardware_nodes_, news);
     };
-    hardware_.emplace(executor, std::move(found), std::min(hardware_refresh, options.refresh), *options.hardware);
+    auto failed = [this](const std::string& problem) { callbacks_.report("plugged-in nodes: " + problem); };
+    hardware_.emplace(executor, std::move(found), std::move(failed), std::min(hardware_refresh, options.refresh),
+                      *options.hardware);
   }
 }
 

@@ -4,12 +4,14 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <optional>
+#include <utility>
 
 #include "node/transport/usb_host.hpp"
 #include "node/transport/watch_timer.hpp"
@@ -78,32 +80,35 @@ awaitable<Result<std::unique_ptr<ByteStream>>> dial_hardware(ConnectionUrl url, 
   return dial_hardware(std::move(url), std::move(options), DriverRoots());
 }
 
-awaitable<std::vector<HardwareNode>> list_hardware_nodes() {
+awaitable<HardwareNodes> list_hardware_nodes() {
   return list_hardware_nodes(DriverRoots());
 }
 
-awaitable<std::vector<HardwareNode>> list_hardware_nodes(DriverRoots roots) {
+awaitable<HardwareNodes> list_hardware_nodes(DriverRoots roots) {
   const auto executor = co_await asio::this_coro::executor;
-  std::vector<HardwareNode> out;
+  HardwareNodes out;
   for (const auto& device : find_driver_devices(roots))
     if (device.transport != "bluetooth")
-      out.push_back(make_node("rr+" + device.transport, device.id, device.node_name));
-  const auto found = co_await UsbHost::of(executor).scan();
-  for (const auto& node : found.nodes) out.push_back(make_node("rr+usb", node.id, node.name));
+      out.nodes.push_back(make_node("rr+" + device.transport, device.id, device.node_name));
+  auto found = co_await UsbHost::of(executor).scan();
+  for (const auto& node : found.nodes) out.nodes.push_back(make_node("rr+usb", node.id, node.name));
+  out.problems = std::move(found.problems);
   co_return out;
 }
 
 struct HardwareWatch::State {
   OnNodes on_nodes;
+  OnProblem on_problem;
   DriverRoots roots;
   WatchTimer timer;
   std::optional<asio::posix::stream_descriptor> news = {};
+  std::vector<std::string> problems = {};  ///< of the look before
 };
 
-HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_nodes, std::chrono::milliseconds refresh,
-                             DriverRoots roots)
-    : state_(std::make_shared<State>(
-          State{std::move(on_nodes), std::move(roots), WatchTimer(executor, refresh, settle_time)})) {
+HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_nodes, OnProblem on_problem,
+                             std::chrono::milliseconds refresh, DriverRoots roots)
+    : state_(std::make_shared<State>(State{std::move(on_nodes), std::move(on_problem), std::move(roots),
+                                           WatchTimer(executor, refresh, settle_time)})) {
   if (const int number = open_news(); number >= 0) {
     state_->news.emplace(executor, number);
     asio::co_spawn(executor, listen(state_), asio::detached);
@@ -120,9 +125,13 @@ HardwareWatch::~HardwareWatch() {
 awaitable<void> HardwareWatch::run(std::shared_ptr<State> state) {
   while (!state->timer.is_stopped()) {
     state->timer.begin_look();
-    const auto nodes = co_await list_hardware_nodes(state->roots);
+    auto found = co_await list_hardware_nodes(state->roots);
     if (state->timer.is_stopped()) break;
-    state->on_nodes(nodes);
+    state->on_nodes(found.nodes);
+    const auto before = std::exchange(state->problems, std::move(found.problems));
+    for (const auto& problem : state->problems)
+      if (!state->timer.is_stopped() && std::find(before.begin(), before.end(), problem) == before.end())
+        state->on_problem(problem);
     co_await state->timer.wait();
   }
 }

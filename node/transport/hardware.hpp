@@ -20,6 +20,12 @@ struct HardwareNode {
   bool operator==(const HardwareNode&) const = default;
 };
 
+/// What is plugged in now.
+struct HardwareNodes {
+  std::vector<HardwareNode> nodes;
+  std::vector<std::string> problems;  ///< USB devices that may be nodes but can't be used, and why
+};
+
 // Overloads, since g++ 12 destroys a braced default argument of an awaited call twice.
 
 /// Order of look-up: devices with a kernel driver, then those that libusb finds (rr+usb only).
@@ -27,16 +33,17 @@ struct HardwareNode {
 awaitable<Result<std::unique_ptr<ByteStream>>> dial_hardware(ConnectionUrl url, DialOptions options, DriverRoots roots);
 awaitable<Result<std::unique_ptr<ByteStream>>> dial_hardware(ConnectionUrl url, DialOptions options);
 
-/// All nodes that are plugged in now.
-awaitable<std::vector<HardwareNode>> list_hardware_nodes(DriverRoots roots);
-awaitable<std::vector<HardwareNode>> list_hardware_nodes();
+awaitable<HardwareNodes> list_hardware_nodes(DriverRoots roots);
+awaitable<HardwareNodes> list_hardware_nodes();
 
 /// Hands the list of nodes to `on_nodes`: at once, shortly after the kernel or udev says that something was plugged in
-/// or out, and every `refresh`. For the executor's thread.
+/// or out, and every `refresh`. `on_problem` hears of each problem that the look before had not. For the executor's
+/// thread.
 class HardwareWatch {
  public:
   using OnNodes = std::function<void(const std::vector<HardwareNode>&)>;
-  HardwareWatch(const boost::asio::any_io_executor& executor, OnNodes on_nodes,
+  using OnProblem = std::function<void(const std::string& problem)>;
+  HardwareWatch(const boost::asio::any_io_executor& executor, OnNodes on_nodes, OnProblem on_problem,
                 std::chrono::milliseconds refresh = std::chrono::seconds(30), DriverRoots roots = {});
   /// No call any more from here on.
   ~HardwareWatch();

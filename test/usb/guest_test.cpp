@@ -120,7 +120,9 @@ std::size_t open_descriptors() {
 TEST_CASE("the device is found, with its node's name and id") {
   Loop loop;
   loop.run([]() -> awaitable<void> {
-    const auto nodes = co_await list_hardware_nodes();
+    const auto found = co_await list_hardware_nodes();
+    CHECK(found.problems.empty());
+    const auto& nodes = found.nodes;
     REQUIRE(nodes.size() == 1);
     CHECK(nodes[0].scheme == "rr+usb");
     CHECK(nodes[0].name == "interop.service");
@@ -242,7 +244,7 @@ TEST_CASE("unplugging with writes pending ends them; it is noticed, and so is pl
         counts.push_back(nodes.size());
         changed.cancel();
       },
-      20s);
+      [](const std::string&) {}, 20s);
   const auto wait_for = [&](std::size_t count) -> awaitable<void> {
     error_code ignored;
     while (counts.empty() || counts.back() != count)

@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
+#include "node/discovery/machine_nodes.hpp"
 #include "node/transport/hardware.hpp"
 #include "node/transport/usb_host.hpp"
 #include "test/core/hardware/simulated_device.hpp"
@@ -18,7 +19,9 @@ using namespace rr;
 using namespace rr::test;
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
+using Catch::Matchers::Contains;
 using Catch::Matchers::EndsWith;
+using Catch::Matchers::StartsWith;
 
 namespace {
 
@@ -126,7 +129,7 @@ TEST_CASE("a watch looks again soon after the system tells of a device, and only
   asio::io_context io{1};
   int looks = 0;
   const HardwareWatch watch(
-      io.get_executor(), [&](const auto&) { ++looks; }, 60s);
+      io.get_executor(), [&](const auto&) { ++looks; }, [](const std::string& problem) { FAIL_CHECK(problem); }, 60s);
   io.run_for(200ms);
   REQUIRE(looks == 1);
   const auto path = machine.plug_in(4, SimulatedDevice({.class_code = 0x08}), {});
@@ -136,4 +139,43 @@ TEST_CASE("a watch looks again soon after the system tells of a device, and only
   machine.tell(path, "remove");
   io.run_for(1s);
   CHECK(looks == 3);  // not only the first time
+}
+
+TEST_CASE("a watch tells once why a device can't be used, and again when it is plugged in anew") {
+  Machine machine;
+  asio::io_context io{1};
+  int looks = 0;
+  std::vector<std::string> problems;
+  const HardwareWatch watch(
+      io.get_executor(), [&](const auto&) { ++looks; }, [&](const auto& problem) { problems.push_back(problem); }, 1ms);
+  const auto look_again = [&] {
+    const auto enough = looks + 3;
+    for (int handlers = 0; looks < enough && handlers < 1000; ++handlers) io.run_one_for(5s);
+    REQUIRE(looks >= enough);
+  };
+  auto path = machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
+  look_again();
+  REQUIRE(problems.size() == 1);
+  CHECK_THAT(problems[0], Contains("(1209:5252): "));
+  machine.remove(path);
+  look_again();
+  path = machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
+  look_again();
+  CHECK(problems.size() == 2);
+}
+
+TEST_CASE("discovery reports a device that can't be used") {
+  Machine machine;
+  machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
+  asio::io_context io{1};
+  std::string reported;
+  MachineNodes::Callbacks callbacks;
+  callbacks.is_own = [](const NodeId&) { return false; };
+  callbacks.report = [&](const std::string& problem) {
+    reported = problem;
+    io.stop();
+  };
+  const MachineNodes nodes(io.get_executor(), {.intra = false, .local = false}, std::move(callbacks));
+  io.run_for(5s);
+  CHECK_THAT(reported, StartsWith("plugged-in nodes: USB device ") && Contains("(1209:5252): "));
 }
