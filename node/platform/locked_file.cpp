@@ -104,9 +104,10 @@ Error LockedFile::failure(const char* what) const {
 }
 
 Result<> LockedFile::write(std::string_view text) {
-  if (::ftruncate(descriptor_, 0) != 0) return failure("truncate");
+  // In this order: who reads it meanwhile, without the lock, may find the end of the old text, but never an empty file.
   const auto written = ::pwrite(descriptor_, text.data(), text.size(), 0);
   if (written < 0 || static_cast<std::size_t>(written) != text.size()) return failure("write");
+  if (::ftruncate(descriptor_, written) != 0) return failure("truncate");
   return {};
 }
 

@@ -35,7 +35,7 @@ class LockedFile {
   LockedFile& operator=(LockedFile&& other) noexcept;
   ~LockedFile();
 
-  /// Replaces the content.
+  /// Replaces the content. Others that read it meanwhile may see the new text with what was behind it in the old one.
   [[nodiscard]] Result<> write(std::string_view text);
   /// At most `limit` bytes of the content.
   [[nodiscard]] Result<std::string> read(std::size_t limit) const;

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <thread>
@@ -200,6 +201,25 @@ TEST_CASE("a lock is of the file that the path names, whoever removes it meanwhi
   other.join();
   CHECK(taken > 100);
   CHECK(lost == 0);
+}
+
+TEST_CASE("a new text is written over the old one: readers never find none") {
+  const Sandbox sandbox;
+  auto file = LockedFile::open(fs::path(sandbox.folder()) / "robot.info").value();
+  REQUIRE(file.write("a longer text").has_value());
+  // Where nothing can be written, what was done to the file before shows.
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
+  const rlimit none{0, before.rlim_max};
+  ::setrlimit(RLIMIT_FSIZE, &none);
+  const auto written = file.write("a text");
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  CHECK_FALSE(written.has_value());
+  CHECK(file.read(100).value() == "a longer text");
+  REQUIRE(file.write("a text").has_value());
+  CHECK(file.read(100).value() == "a text");
 }
 
 TEST_CASE("a file that is given to somebody else looks different") {
