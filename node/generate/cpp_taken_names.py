@@ -1,24 +1,28 @@
 #!/usr/bin/env python3
-"""Writes cpp_macros.inc and cpp_globals.inc: names that the headers of generated C++ take.
+"""Keeps cpp_macros.inc and cpp_globals.inc: names that the headers of generated C++ take.
 
-Run by hand, with g++ and the headers of the C library on Linux: python3 node/generate/cpp_taken_names.py
+cpp_taken_names.py          adds what this machine's headers have; what those of another compiler or C library have stays
+cpp_taken_names.py --check  fails where this machine's headers have names that the lists lack, and prints them
+
+Needs g++ and the headers of the C library on Linux.
 """
 
 import os
 import pathlib
 import re
 import subprocess
+import sys
 import textwrap
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-COMPILE = ["g++", "-std=gnu++20", f"-I{ROOT}/include", f"-I{ROOT}", "-x", "c++", "-"]
+FOLDERS = [ROOT / "include", ROOT, ROOT / "build/deps/boost181/usr/include"]  # the last: where the system's Boost is older
+COMPILE = ["g++", "-std=gnu++20", *(f"-I{folder}" for folder in FOLDERS), "-x", "c++", "-"]
 INCLUDES = '#include "rrgate/client.hpp"\n#include "rrgate/device.hpp"\n'
-NAME = re.compile(r"[A-Za-z](\w*[A-Za-z0-9])?", re.ASCII)  # as the language of definitions has them
-# Left out are names that no definition is expected to have: macros of Boost, numbers of system calls, and services
-# whose first word has more than small letters.
-LEFT_OUT = ("BOOST_", "SYS_")
+# As the language of definitions has names. Left out are those that no definition is expected to have: macros of Boost,
+# numbers of system calls, and include guards.
 FIRST_WORD = re.compile(r"[a-z]+")
+NAME = re.compile(r"(?!BOOST_|SYS_)(?!\w*_(?:H|HPP)\b)[A-Za-z](?:\w*[A-Za-z0-9])?", re.ASCII)
 
 
 def run(*options: str, source: str, check: bool = True) -> subprocess.CompletedProcess:
@@ -29,10 +33,10 @@ def run(*options: str, source: str, check: bool = True) -> subprocess.CompletedP
     )
 
 
-def macros() -> set[str]:
-    """All but those that are defined as themselves, which replace nothing."""
-    found = re.findall(r"^#define (\w+)(?:\([^)]*\))? ?(.*)$", run("-E", "-dM", source=INCLUDES).stdout, re.MULTILINE)
-    return {name for name, text in found if NAME.fullmatch(name) and text != name and not name.startswith(LEFT_OUT)}
+def macros() -> dict[str, str]:
+    """By name what replaces it."""
+    text = run("-E", "-dM", source=INCLUDES).stdout
+    return dict(re.findall(r"^#define (\w+)(?:\([^)]*\))? ?(.*)$", text, re.MULTILINE))
 
 
 def global_names(taken: set[str]) -> set[str]:
@@ -44,12 +48,38 @@ def global_names(taken: set[str]) -> set[str]:
     return names & set(re.findall(r"error: 'namespace (\w+) { }' redeclared", errors))
 
 
-def write(file: str, names: set[str]) -> None:
-    text = textwrap.fill(", ".join(f'"{name}"' for name in sorted(names)), 120, break_on_hyphens=False)
-    (HERE / file).write_text(f"// Made by cpp_taken_names.py.\n{text}\n")
+def names_of_headers() -> dict[str, set[str]]:
+    """By the file that lists them. A macro that is defined as itself replaces nothing."""
+    all_macros = macros()
+    replaced = {name for name, text in all_macros.items() if NAME.fullmatch(name) and text != name}
+    return {"cpp_macros.inc": replaced, "cpp_globals.inc": global_names(set(all_macros))}
+
+
+def listed(folder: pathlib.Path, file: str) -> set[str]:
+    return {name for name in re.findall(r'"(\w+)"', (folder / file).read_text()) if NAME.fullmatch(name)}
+
+
+def lacking(folder: pathlib.Path, found: dict[str, set[str]]) -> list[str]:
+    return [f"{file} lacks {name}" for file, names in found.items() for name in sorted(names - listed(folder, file))]
+
+
+def add(folder: pathlib.Path, found: dict[str, set[str]]) -> None:
+    for file, names in found.items():
+        quoted = ", ".join(f'"{name}"' for name in sorted(names | listed(folder, file)))
+        text = textwrap.fill(quoted, 120, break_on_hyphens=False)
+        (folder / file).write_text(f"// Made by cpp_taken_names.py.\n{text}\n")
+
+
+def main(words: list[str]) -> int:
+    found = names_of_headers()
+    if words != ["--check"]:
+        add(HERE, found)
+        return 0
+    problems = lacking(HERE, found)
+    if problems:
+        print(*problems, "python3 node/generate/cpp_taken_names.py adds them", sep="\n")
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":
-    all_macros = macros()
-    write("cpp_macros.inc", all_macros)
-    write("cpp_globals.inc", global_names(all_macros))
+    sys.exit(main(sys.argv[1:]))
