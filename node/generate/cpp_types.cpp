@@ -98,11 +98,13 @@ std::string CppTypes::declared_name(std::string_view qualified_name, std::string
   const auto [service, name] = split_qualified(qualified_name);
   auto chosen = cpp_word(std::string(name) + std::string(suffix));
   const auto* definition = set_.find_service(service);
-  // Classes that are made from an object's name give way to names of the definition; all do to inner namespaces.
+  // Classes that are made from an object's name give way to names of the definition, and to the object's members, which
+  // have the same name in all classes; all do to inner namespaces.
   const auto is_taken = [&, service = service, name = name] {  // clang 14 captures no bindings by itself
     if (set_.has_service_within(std::string(service) + '.' + chosen)) return true;
     if (suffix.empty() || !definition) return false;
-    return has_name(*definition, chosen) ||
+    const auto* object = definition->find_entity(name);
+    return has_name(*definition, chosen) || (object && object->find_member(chosen)) ||
            (suffix == "AsyncClient" && has_name(*definition, std::string(name) + "Async"));
   };
   while (is_taken()) chosen += '_';

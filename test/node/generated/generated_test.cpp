@@ -218,6 +218,18 @@ TEST_CASE("generated: stubs that are used too early or twice say so") {
   CHECK_THROWS_WITH(make_service("two", root), Contains("belongs to service 'one'"));
 }
 
+TEST_CASE("generated: a member with the name of a class that is made of its object") {
+  struct MyHome : HomeService_ {
+    void Home() override {}
+    std::string HomeService() override { return "at home"; }
+    Nullable<same> get_value() override { return {}; }
+    void set_value(Nullable<same>) override {}
+  };
+  RunningNode node([](Node& owner) { owner.add(make_service("home", std::make_shared<MyHome>())); });
+  CHECK(ActuatorClient(connect(node.url("home"))).HomeService() == "at home");
+  CHECK(HomeClient(connect(node.url("home"))).HomeService() == "at home");
+}
+
 TEST_CASE("generated: constants and names") {
   CHECK(class_ == 5);
   CHECK(smallest == std::numeric_limits<std::int64_t>::min());
