@@ -21,7 +21,6 @@ COMPILE = ["g++", "-std=gnu++20", *(f"-I{folder}" for folder in FOLDERS), "-x", 
 INCLUDES = '#include "rrgate/client.hpp"\n#include "rrgate/device.hpp"\n'
 # As the language of definitions has names. Left out are those that no definition is expected to have: macros of Boost,
 # numbers of system calls, and include guards.
-FIRST_WORD = re.compile(r"[a-z]+")
 NAME = re.compile(r"(?!BOOST_|SYS_)(?!\w*_(?:H|HPP)\b)[A-Za-z](?:\w*[A-Za-z0-9])?", re.ASCII)
 
 
@@ -42,7 +41,7 @@ def macros() -> dict[str, str]:
 def global_names(taken: set[str]) -> set[str]:
     """Functions, variables and types: the compiler refuses a namespace of the same name."""
     words = set(re.findall(r"\w+", run("-E", "-P", source=INCLUDES).stdout, re.ASCII))
-    names = {word for word in words - taken if FIRST_WORD.fullmatch(word)}
+    names = {word for word in words - taken if NAME.fullmatch(word)}
     tried = INCLUDES + "".join(f"namespace {name} {{}}\n" for name in sorted(names))
     errors = run("-fsyntax-only", "-fmax-errors=0", source=tried, check=False).stderr
     return names & set(re.findall(r"error: 'namespace (\w+) { }' redeclared", errors))

@@ -119,11 +119,18 @@ TEST_CASE("generate ts: constants of a definition are written once, however many
   CHECK(types_of(200).size() < 3 * types_of(100).size());
 }
 
-TEST_CASE("generate cpp: a service whose name begins like a function of the C library") {
+TEST_CASE("generate cpp: services whose names begin like a function or type of the C library, and others") {
   const Folder folder;
-  const auto file = folder.write("words.robdef", "service exp.log\nstdver 0.10\nobject exp\nend\n");
-  CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_ok);
-  CHECK_THAT(folder.read("exp__log.hpp"), Contains("\nnamespace exp_::log {\n"));
+  for (const auto& [service, name_space] : {std::pair("exp.log", "exp_::log"), std::pair("log2.arm", "log2_::arm"),
+                                            std::pair("int8_t.log2", "int8_t_::log2"), std::pair("FILE.x", "FILE_::x"),
+                                            std::pair("com2.x", "com2::x"), std::pair("Foo.bar", "Foo::bar")}) {
+    const auto file =
+        folder.write("words.robdef", "service " + std::string(service) + "\nstdver 0.10\nobject exp\nend\n");
+    CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_ok);
+    auto name = std::string(service) + ".hpp";
+    name.replace(name.find('.'), 1, "__");
+    CHECK_THAT(folder.read(name), Contains("\nnamespace " + std::string(name_space) + " {\n"));
+  }
 }
 
 TEST_CASE("generate: mistakes") {
