@@ -8,8 +8,10 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <optional>
 
+#include "core/support/hex.hpp"
 #include "node/transport/byte_stream.hpp"
 
 namespace rr {
@@ -29,6 +31,19 @@ asio::ip::address_v6 group(std::uint8_t scope, unsigned zone) {
   bytes[14] = 0xba;
   bytes[15] = 0x86;
   return asio::ip::address_v6(bytes, zone);
+}
+
+/// Interfaces that are members of the group, by whichever socket. Nullopt: the system does not tell.
+std::optional<std::set<unsigned>> members_of(const asio::ip::address_v6& wanted) {
+  std::ifstream in("/proc/self/net/igmp6");
+  if (!in) return std::nullopt;
+  const auto bytes = wanted.to_bytes();
+  const auto text = hex_text(bytes);
+  std::set<unsigned> members;
+  unsigned interface = 0;
+  for (std::string name, address, rest; in >> interface >> name >> address && std::getline(in, rest);)
+    if (address == text) members.insert(interface);
+  return members;
 }
 
 /// Where a datagram went, as IPV6_RECVPKTINFO tells; any where it does not.
@@ -129,11 +144,12 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
       socket.send_to(asio::buffer(packet.data(), packet.size()), {target, discovery_port}, 0, error);
   }
 
-  void listen() {
-    if (!listens_) return;
+  /// Whether packets may have been missed since the last call.
+  bool listen() {
+    if (!listens_) return false;
     if (!v6_ && !group_scopes(scopes_).empty()) open(v6_, {asio::ip::address_v6::any(), discovery_port});
     if (!v4_ && scopes_.ipv4_broadcast) open(v4_, {asio::ip::address_v4::any(), discovery_port});
-    join_groups();
+    return v6_ && join_groups();
   }
 
   void open(std::shared_ptr<Receiver>& receiver, const udp::endpoint& endpoint) {
@@ -156,20 +172,26 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
     receive(opened);
   }
 
-  void join_groups() {
-    if (!v6_) return;
+  /// Whether memberships had been lost.
+  bool join_groups() {
     std::set<unsigned> present;
     for (const auto& address : addresses_)
       if (address.address.is_v6()) present.insert(address.interface_index);
-    for (const auto interface : present)
-      if (!v6_->joined.contains(interface))
-        for (const auto scope : group_scopes(scopes_)) {
-          error_code ignored;  // an interface without multicast
-          // One whose IPv6 was off for a while has lost its memberships, but may not join a second time.
-          v6_->socket.set_option(asio::ip::multicast::leave_group(group(scope, 0), interface), ignored);
-          v6_->socket.set_option(asio::ip::multicast::join_group(group(scope, 0), interface), ignored);
-        }
+    bool has_lost = false;
+    for (const auto scope : group_scopes(scopes_)) {
+      const auto members = members_of(group(scope, 0));
+      for (const auto interface : present) {
+        const bool is_new = !v6_->joined.contains(interface);
+        if (!is_new && (!members || members->contains(interface))) continue;
+        error_code error;  // an interface without multicast
+        // One whose IPv6 was off, if only for a moment, has lost its memberships, but may not join a second time.
+        v6_->socket.set_option(asio::ip::multicast::leave_group(group(scope, 0), interface), error);
+        v6_->socket.set_option(asio::ip::multicast::join_group(group(scope, 0), interface), error);
+        has_lost = has_lost || (!is_new && !error);
+      }
+    }
     v6_->joined = present;  // an interface that has gone takes its membership along
+    return has_lost;
   }
 
   void receive(const std::shared_ptr<Receiver>& receiver) {
@@ -236,9 +258,9 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
       auto found = local_addresses();
       const bool is_changed = found != self->addresses_;
       self->addresses_ = std::move(found);
-      self->listen();
+      const bool has_missed_packets = self->listen();
       self->rescan_later();
-      if (is_changed) self->callbacks_.addresses_changed();
+      if (is_changed || has_missed_packets) self->callbacks_.addresses_changed();
     });
   }
 

@@ -31,7 +31,7 @@ class IpDiscovery {
  public:
   struct Callbacks {
     std::function<void(std::string_view packet, const PacketSource& source)> received;
-    std::function<void()> addresses_changed;  ///< this machine's
+    std::function<void()> addresses_changed;  ///< this machine's; or packets may have been missed
     std::function<void(const std::string& problem)> report;
   };
 

@@ -281,6 +281,21 @@ def test_nodes_are_found_again_when_an_interface_had_no_ipv6_for_a_while(network
     watch.wait_for(lambda event: event["id"] == IDS[1], seconds=20)
 
 
+def test_nodes_are_found_again_when_an_interface_had_no_ipv6_for_a_moment(network, start):
+    """Its memberships have gone, but the same addresses are there when the program looks again, which it does every 5 s."""
+    with network.call(1, lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as heard:
+        heard.bind(("", PORT))
+        heard.settimeout(10)
+        watch = Watch(start(0, OURS, "watch", "all"))
+        assert b"Request" in heard.recv(8192)  # the first of three
+        with network.without_ipv6(0):
+            pass
+        for _ in range(2 + 3):
+            assert b"Request" in heard.recv(8192)
+    serve(start, "ours", 1, "a.node", IDS[1])
+    watch.wait_for(lambda event: event["id"] == IDS[1], seconds=20)
+
+
 def test_localhost_is_served_by_a_machine_without_ipv6(network, start, tmp_path):
     config = tmp_path / "gateway.json"
     config.write_text(json.dumps({"listen": ["localhost:8082"], "devices": []}))
