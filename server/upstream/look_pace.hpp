@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <ratio>
 #include <utility>
 
 namespace rrgate {
 
 /// Looks that would begin faster than the pace wait for their turn, so that looking at thousands of devices takes a
-/// bounded share of the processor, and looks that hold memory are few at a time. Few devices never wait.
+/// bounded share of the processor, and looks that hold memory are few at a time. Few devices never wait. Those that
+/// wait begin several at a time: a look for which the process wakes alone takes half as much again, since what it needs
+/// has left the processor's caches.
 class LookPace {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -20,14 +23,16 @@ class LookPace {
 
   static constexpr int first_per_second = 1000;
   static constexpr int later_per_second = 125;
-  static constexpr int at_once = 100;  ///< may begin together, where none have begun lately
+  static constexpr int at_once = 100;                           ///< may begin together, where none have begun lately
+  using Beat = std::chrono::duration<std::int64_t, std::deci>;  ///< from those that begin together to the next ones
 
-  /// Takes a turn. Returns when it is: `now` or later.
+  /// Takes a turn. Returns when it is: `now`, or a later beat.
   TimePoint take_turn(Look look, TimePoint now) {
     const std::chrono::microseconds step(1'000'000 / (look == Look::first ? first_per_second : later_per_second));
     auto& next = look == Look::first ? next_first_ : next_later_;
     next = std::max(next, now - (at_once - 1) * step);
-    return std::max(now, std::exchange(next, next + step));
+    const auto turn = std::exchange(next, next + step);
+    return turn <= now ? now : std::chrono::ceil<Beat>(turn);
   }
 
  private:
