@@ -21,21 +21,18 @@ Error definition_error(const Diagnostic& diagnostic) {
                     "service definition" + service + ": " + format_diagnostic(diagnostic));
 }
 
-/// The first error, if there is one; warnings go to `warnings`.
-const Diagnostic* sort_out(const std::vector<Diagnostic>& diagnostics, std::vector<Diagnostic>& warnings) {
-  for (const auto& diagnostic : diagnostics) {
-    if (diagnostic.severity == Severity::error) return &diagnostic;
-    warnings.push_back(diagnostic);
-  }
-  return nullptr;
+const Diagnostic* first_error(const std::vector<Diagnostic>& diagnostics) {
+  const auto found = std::find_if(diagnostics.begin(), diagnostics.end(),
+                                  [](const Diagnostic& diagnostic) { return diagnostic.severity == Severity::error; });
+  return found == diagnostics.end() ? nullptr : &*found;
 }
 
 /// Orders verified definitions (no cycles among imports) with imports before importers.
 class ImportOrder {
  public:
-  explicit ImportOrder(std::vector<std::unique_ptr<ServiceDefinition>>& from) : from_(from) {}
+  explicit ImportOrder(TypeRegistry::Definitions& from) : from_(from) {}
 
-  std::vector<std::unique_ptr<ServiceDefinition>> take() {
+  TypeRegistry::Definitions take() {
     // Depth first without recursion: a peer decides how long a chain of imports is.
     for (std::size_t start = 0; start < from_.size(); ++start) {
       if (from_[start]) open_.push_back({start});
@@ -69,46 +66,49 @@ class ImportOrder {
     return static_cast<std::size_t>(found - from_.begin());
   }
 
-  std::vector<std::unique_ptr<ServiceDefinition>>& from_;
-  std::vector<std::unique_ptr<ServiceDefinition>> ordered_;
+  TypeRegistry::Definitions& from_;
+  TypeRegistry::Definitions ordered_;
   std::vector<Visit> open_;
 };
 
 }  // namespace
 
 Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mode) {
+  std::vector<ParseResult> parsed;
+  for (const auto& text : texts) parsed.push_back(parse_service_definition(text, mode));
+  return add_parsed(std::move(parsed), mode);
+}
+
+Result<> TypeRegistry::add_parsed(std::vector<ParseResult> parsed, RobdefMode mode) {
   Definitions added;
-  std::vector<Diagnostic> warnings;
-  for (const auto& text : texts) {
-    auto parsed = parse_service_definition(text, mode);
-    const auto& name = parsed.definition.name;
-    if (find_service(name)) continue;
-    const auto is_same = [&](const auto& other) {
-      return other->name == name && other->text == parsed.definition.text;
+  std::vector<ServiceDefinition*> set;
+  for (auto& [definition, diagnostics] : parsed) {
+    if (find_service(definition.name)) continue;
+    const auto is_same = [&definition = definition](const auto& other) {
+      return other->name == definition.name && other->text == definition.text;
     };
     if (std::any_of(added.begin(), added.end(), is_same)) continue;
-    if (const auto* error = sort_out(parsed.diagnostics, warnings)) return definition_error(*error);
-    added.push_back(std::make_unique<ServiceDefinition>(std::move(parsed.definition)));
+    if (const auto* error = first_error(diagnostics)) return definition_error(*error);
+    auto made = std::make_shared<ServiceDefinition>(std::move(definition));
+    set.push_back(made.get());
+    added.push_back(std::move(made));
   }
   if (added.empty()) return {};
-
-  std::vector<ServiceDefinition*> set;
-  for (const auto& definition : added) set.push_back(definition.get());
-  auto findings = verify_service_definitions(set, known_imports(added), mode);
-  std::erase_if(findings, [&](const Diagnostic& finding) {
-    return finding.severity == Severity::warning && find_service(finding.service);
-  });
-  if (const auto* error = sort_out(findings, warnings)) return definition_error(*error);
-
-  for (auto& definition : ImportOrder(added).take()) {
-    services_.emplace(definition->name, definition.get());
-    for (const auto& entity : definition->entities) entities_.emplace(entity.qualified_name, &entity);
-    for (const auto& enumeration : definition->enums)
-      enums_.emplace(definition->name + "." + enumeration.name, &enumeration);
-    definitions_.push_back(std::move(definition));
-  }
-  warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
+  const auto findings = verify_service_definitions(set, known_imports(added), mode);
+  if (const auto* error = first_error(findings)) return definition_error(*error);
+  for (auto& definition : ImportOrder(added).take()) insert(std::move(definition));
   return {};
+}
+
+void TypeRegistry::share(const TypeRegistry& from) {
+  for (const auto& definition : from.definitions_)
+    if (!find_service(definition->name)) insert(definition);
+}
+
+void TypeRegistry::insert(std::shared_ptr<const ServiceDefinition> definition) {
+  services_.emplace(definition->name, definition.get());
+  for (const auto& entity : definition->entities) entities_.emplace(entity.qualified_name, &entity);
+  definitions_.push_back(std::move(definition));
 }
 
 std::vector<const ServiceDefinition*> TypeRegistry::known_imports(const Definitions& importers) const {
@@ -133,7 +133,9 @@ const EntityDefinition* TypeRegistry::find_entity(std::string_view qualified_nam
 }
 
 const EnumDefinition* TypeRegistry::find_enum(std::string_view qualified_name) const {
-  return find_in(enums_, qualified_name);
+  const auto [service, name] = split_qualified(qualified_name);
+  const auto* definition = find_service(service);
+  return definition ? definition->find_enum(name) : nullptr;
 }
 
 }  // namespace rr

@@ -120,13 +120,12 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
 // --- objects ---
 
 /// Whoever has joined something has definitions in hand: they stay, unless the device says something else now.
-rr::Result<> Upstream::take_over_definitions(const rr::TypeRegistry& from) {
-  const auto& now = from.definitions();
+void Upstream::take_over_definitions(const rr::TypeRegistry& from) {
   const auto differs = [&](const auto& definition) {
     const auto* known = types_->find_service(definition->name);
     return known && known->text != definition->text;
   };
-  if (!types_ || std::any_of(now.begin(), now.end(), differs)) {
+  if (!types_ || std::any_of(from.definitions().begin(), from.definitions().end(), differs)) {
     const auto changed = rr::make_error(rr::ErrorCode::invalid_state, "the service has changed");
     while (!wires_.empty()) drop_wire(MemberKey(wires_.begin()->first), &changed);
     while (!pipes_.empty()) drop_pipe(pipes_.begin()->first);
@@ -136,11 +135,7 @@ rr::Result<> Upstream::take_over_definitions(const rr::TypeRegistry& from) {
       });
     types_ = std::make_shared<rr::TypeRegistry>();
   }
-  std::vector<std::string> texts;
-  for (const auto& definition : now)
-    if (!types_->find_service(definition->name)) texts.push_back(definition->text);
-  if (texts.empty()) return {};
-  return types_->add(texts, rr::RobdefMode::compat);
+  types_->share(from);
 }
 
 const rr::EntityDefinition* Upstream::object_type(const std::string& path) const {
@@ -188,8 +183,7 @@ void Upstream::look_up(const std::string& path, Completion done) {
   connection_->find_object(path, [weak = weak_from_this(), path, done = std::move(done)](rr::Result<rr::Value> found) {
     const auto self = weak.lock();
     if (self && self->connection_ && found) {
-      if (auto taken = self->take_over_definitions(self->connection_->session().types()); !taken)
-        return done(taken.error());
+      self->take_over_definitions(self->connection_->session().types());
       if (const auto* type = self->object_type(path)) self->watch_object(path, *type);
     }
     done(std::move(found));

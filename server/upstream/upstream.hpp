@@ -149,7 +149,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// The type of an object that was found, from types(). Null: it was not, or there is no session.
   const rr::EntityDefinition* object_type(const std::string& path) const;
   /// Adds to types() what another session with the service has found.
-  rr::Result<> take_over_definitions(const rr::TypeRegistry& from);
+  void take_over_definitions(const rr::TypeRegistry& from);
   /// Whether the service is for users who have logged in, and this session is nobody's.
   bool requires_user() const { return requires_user_; }
   /// Whether it is open, and the device lets it do anything.

@@ -83,10 +83,7 @@ rr::awaitable<rr::Result<>> Upstream::open() {
     if (const auto still_there = weak.lock()) still_there->handle_released(path);
   });
   loss_.reset();
-  if (auto taken = take_over_definitions(connection_->session().types()); !taken) {
-    break_off();
-    co_return taken;
-  }
+  take_over_definitions(connection_->session().types());
   if (const auto* root = object_type(service_)) watch_object(service_, *root);
   look_up_again();
   locks_->handle_opened(self);

@@ -260,9 +260,9 @@ class ClientSession {
  private:
   /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
   struct Fetch {
-    std::vector<std::string> texts = {};
-    std::size_t bytes = 0;              ///< of `texts`
-    std::set<std::string> names = {};   ///< of `texts`
+    std::vector<ParseResult> parsed = {};
+    std::size_t bytes = 0;              ///< of their texts
+    std::set<std::string> names = {};   ///< theirs
     std::set<std::string> wanted = {};  ///< imported or asked for
     std::set<std::string> asked = {};
     std::string last_asked = {};
@@ -270,7 +270,7 @@ class ClientSession {
     std::string path = {};
     std::string object_type = {};
 
-    void add(std::string text);
+    void add(std::string_view text);
   };
   struct Pending {
     EntryType type = EntryType::null;

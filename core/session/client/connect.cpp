@@ -29,13 +29,12 @@ std::vector<std::string> read_texts(const Message& message, const MessageEntry& 
 
 }  // namespace
 
-void ClientSession::Fetch::add(std::string text) {
+void ClientSession::Fetch::add(std::string_view text) {
   bytes += text.size();
   if (bytes > max_fetched_bytes) return;  // advance_fetch() says so
-  const auto parsed = parse_service_definition(text, RobdefMode::compat);
-  names.insert(parsed.definition.name);
-  for (const auto& import : parsed.definition.imports) wanted.insert(import.name);
-  texts.push_back(std::move(text));
+  const auto& definition = parsed.emplace_back(parse_service_definition(text, RobdefMode::compat)).definition;
+  names.insert(definition.name);
+  for (const auto& import : definition.imports) wanted.insert(import.name);
 }
 
 void ClientSession::start_session(Now now) {
@@ -86,8 +85,7 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
       read_object_type(entry);
       keep_attributes(entry);
       Fetch fetch;
-      for (auto& text : take_definitions(entry, {}, read_texts(message, entry, "servicedefs")))
-        fetch.add(std::move(text));
+      for (const auto& text : take_definitions(entry, {}, read_texts(message, entry, "servicedefs"))) fetch.add(text);
       return advance_fetch(std::move(fetch), now);
     }
     case EntryType::get_service_desc: {
@@ -201,12 +199,13 @@ void ClientSession::handle_fetch_reply(const MessageEntry& entry, Fetch fetch, N
   if (message.elements_of(entry).find("servicedef")) sent.push_back(read_text(message, entry, "servicedef"));
   sent = take_definitions(entry, fetch.last_asked, std::move(sent));
   // Without any, advance_fetch() says that the node answered with another one.
-  fetch.add(sent.empty() ? std::string() : std::move(sent.front()));
+  fetch.add(sent.empty() ? std::string_view() : sent.front());
   advance_fetch(std::move(fetch), now);
 }
 
 void ClientSession::finish_fetch(Fetch fetch, Now now) {
-  if (auto added = types_.add(fetch.texts, RobdefMode::compat); !added) return fail_fetch(fetch, added.error());
+  if (auto added = types_.add_parsed(std::move(fetch.parsed), RobdefMode::compat); !added)
+    return fail_fetch(fetch, added.error());
   if (fetch.lookup == 0) {
     // The older sequence has asked for definitions only; the combined one is at its end.
     if (root_type_.empty()) return request_special(EntryType::object_type_name, options_.service, now);

@@ -43,6 +43,27 @@ TEST_CASE("what a large message took on both sides of a session is given back") 
   CHECK(live_bytes <= before + 64 * 1024);
 }
 
+TEST_CASE("a client parses a definition once") {
+  std::string text = "service test.large\nobject Large\n";
+  for (int i = 0; i < 1000; ++i) text += "  property double number_of_something_" + std::to_string(i) + "\n";
+  text += "end\n";
+  const auto types = std::make_shared<TypeRegistry>();
+  auto before = allocation_count;
+  REQUIRE(types->add({text}, RobdefMode::compat));
+  const auto once = allocation_count - before;
+
+  Loopback pair;
+  pair.directory.add(HostedService::make("large", std::make_shared<PlainObject>("test.large.Large"), types).value())
+      .value();
+  ClientOptions options;
+  options.connection.self = {client_id, "test.client"};
+  options.service = "large";
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  before = allocation_count;
+  pair.connect();
+  CHECK(allocation_count - before < once + once / 10);
+}
+
 TEST_CASE("small answers that nobody reads are counted with all that they take of the memory") {
   Loopback pair;
   constexpr std::size_t limit = 2'000'000;

@@ -105,12 +105,31 @@ TEST_CASE("a long chain of imports is put in order") {
   CHECK(types.definitions().back()->name == "s0");
 }
 
-TEST_CASE("warnings are collected once") {
+TEST_CASE("a copy has the same definitions, and what is added to one is not added to the other") {
   TypeRegistry types;
-  const std::string twice = "service w\nstdver 0.10\nimport a.base\nimport a.base\n";
-  REQUIRE(types.add({base, twice}, RobdefMode::compat));
-  const auto count = types.warnings().size();
-  CHECK(count > 0);
-  REQUIRE(types.add({user}, RobdefMode::compat));
-  CHECK(types.warnings().size() == count);
+  REQUIRE(types.add({base, user}, RobdefMode::strict));
+  auto copy = std::make_unique<TypeRegistry>(types);
+  CHECK(copy->find_entity("a.user.O") == types.find_entity("a.user.O"));
+  REQUIRE(copy->add({top}, RobdefMode::strict));
+  CHECK_FALSE(types.find_service("top"));
+  copy.reset();
+  CHECK(types.find_enum("a.base.mode")->name == "mode");
+  CHECK(types.find_entity("a.base.S")->qualified_name == "a.base.S");
+}
+
+TEST_CASE("definitions that are shared are those of the other registry, and outlive it") {
+  TypeRegistry types;
+  REQUIRE(types.add({base}, RobdefMode::strict));
+  const auto* structure = types.find_entity("a.base.S");
+  const ServiceDefinition* shared = nullptr;
+  {
+    TypeRegistry other;
+    REQUIRE(other.add({top, user, base}, RobdefMode::strict));
+    shared = other.find_service("a.user");
+    types.share(other);
+  }
+  CHECK(names_of(types) == std::vector<std::string>{"a.base", "a.user", "top"});
+  CHECK(types.find_service("a.user") == shared);
+  CHECK(types.find_entity("a.base.S") == structure);
+  CHECK(types.find_entity("a.user.O")->find_member("t")->type.qualified_name == "a.base.S");
 }
