@@ -29,6 +29,7 @@ ClientOptions index_options(const ConnectionUrl& url, const ServiceQueryOptions&
   out.connection.handshake_timeout = options.dial.timeout;
   out.connection.max_message_size = options.max_answer_bytes;
   out.service = service_index_name;
+  out.read_definitions = options.definitions;
   return out;
 }
 

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/discovery/detected_nodes.hpp"
 #include "core/session/connection.hpp"
+#include "core/types/read_definitions.hpp"
 #include "core/types/value.hpp"
 #include "node/transport/dial.hpp"
 
@@ -37,6 +39,7 @@ struct ServiceQueryOptions {
   NodeId self_id = {};         ///< any: a random one
   DialOptions dial = {};       ///< timeout: for all that follows, too
   std::size_t max_answer_bytes = 64 * 1024;
+  std::shared_ptr<ReadDefinitions> definitions = {};  ///< see ClientOptions::read_definitions
 };
 
 /// Connects to the service index of `url`'s node, asks, disconnects.

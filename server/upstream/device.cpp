@@ -29,20 +29,19 @@ struct Reached {
   ProbeResult answer;
 };
 
-rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
-  auto answer = co_await probe(url, std::move(options), self_id);
+rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, ProbeOptions options) {
+  auto answer = co_await probe(url, std::move(options));
   if (!answer) co_return answer.error();
   Reached reached{std::move(url), std::move(*answer)};
   co_return reached;
 }
 
-rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, rr::DialOptions options,
-                                             rr::NodeId self_id) {
+rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, ProbeOptions options) {
   std::vector<rr::Runner<Reached>> runners;
   for (auto& url : urls) {
     rr::Runner<Reached> runner;
     runner.name = rr::format_url(url);
-    runner.run = [url = std::move(url), options, self_id] { return probe_at(url, options, self_id); };
+    runner.run = [url = std::move(url), options] { return probe_at(url, options); };
     runners.push_back(std::move(runner));
   }
   const auto nothing = rr::make_error(rr::ErrorCode::connection_error, "no URL");
@@ -251,7 +250,7 @@ rr::awaitable<void> Device::watch() {
     if (is_stopping_) break;
     looks_again_ = false;
     has_come_back_ = false;
-    auto probed = probe_any(urls_to_try(), dial_options(), look_id_);
+    auto probed = probe_any(urls_to_try(), {look_id_, dial_options(), definitions_});
     auto reached = co_await until_stopped(std::move(probed));
     if (is_stopping_) break;
     rr::Result<ProbeResult> result = rr::Error{};

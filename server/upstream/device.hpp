@@ -18,6 +18,7 @@
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/log/metrics.hpp"
+#include "server/upstream/device_definitions.hpp"
 #include "server/upstream/look_pace.hpp"
 #include "server/upstream/page_link.hpp"
 #include "server/upstream/probe.hpp"
@@ -129,6 +130,9 @@ class Device : public std::enable_shared_from_this<Device> {
 
   /// Its looks take their turns; without this none waits.
   void share_pace(std::shared_ptr<LookPace> pace) { pace_ = std::move(pace); }
+  /// What it defines is read once for all that have the same; without this, each time anew.
+  void share_definitions(std::shared_ptr<rr::ReadDefinitions> definitions) { definitions_ = std::move(definitions); }
+  const std::shared_ptr<rr::ReadDefinitions>& definitions() const { return definitions_; }
 
   /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
   rr::awaitable<void> watch();
@@ -159,11 +163,12 @@ class Device : public std::enable_shared_from_this<Device> {
   std::set<std::shared_ptr<boost::asio::cancellation_signal>> dialing_;  ///< what stop() ends
   Retry retry_;
   std::chrono::milliseconds request_timeout_;
-  rr::Backoff backoff_;             ///< between looks at it while it does not answer
-  std::shared_ptr<LookPace> pace_;  ///< of all devices; may be null
-  const rr::NodeId look_id_;        ///< the node that looks come from: none but they have it
-  bool has_come_back_ = false;      ///< the look that is on its way
-  bool is_circle_ = false;          ///< the last look came back, and was not answered
+  rr::Backoff backoff_;                               ///< between looks at it while it does not answer
+  std::shared_ptr<LookPace> pace_;                    ///< of all devices; may be null
+  std::shared_ptr<rr::ReadDefinitions> definitions_;  ///< likewise
+  const rr::NodeId look_id_;                          ///< the node that looks come from: none but they have it
+  bool has_come_back_ = false;                        ///< the look that is on its way
+  bool is_circle_ = false;                            ///< the last look came back, and was not answered
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;

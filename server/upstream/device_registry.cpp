@@ -24,6 +24,7 @@ std::shared_ptr<Device> DeviceRegistry::make(DeviceConfig device, const Config& 
                                              std::shared_ptr<PageLink> page) {
   auto made = std::make_shared<Device>(executor_, std::move(device), whole, std::move(tls), std::move(page));
   made->share_pace(pace_);
+  made->share_definitions(definitions_);
   return made;
 }
 

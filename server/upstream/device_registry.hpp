@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/upstream/device.hpp"
+#include "server/upstream/device_definitions.hpp"
 
 namespace rrgate {
 
@@ -57,7 +58,9 @@ class DeviceRegistry {
 
   boost::asio::any_io_executor executor_;
   const Config& config_;
-  std::shared_ptr<LookPace> pace_ = std::make_shared<LookPace>();  ///< devices may outlive this
+  // Devices may outlive this.
+  std::shared_ptr<LookPace> pace_ = std::make_shared<LookPace>();
+  std::shared_ptr<rr::ReadDefinitions> definitions_ = std::make_shared<DeviceDefinitions>();
   std::vector<std::shared_ptr<Device>> devices_;
   std::function<void()> on_change_;
   std::uint64_t changes_ = 0;

@@ -7,11 +7,12 @@
 
 namespace rrgate {
 
-rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, ProbeOptions options) {
   rr::ServiceQueryOptions query;
   query.self_name = gateway_node_name;
-  query.self_id = self_id;
-  query.dial = std::move(options);
+  query.self_id = options.self_id;
+  query.dial = std::move(options.dial);
+  query.definitions = std::move(options.definitions);
   query.max_answer_bytes = 12u * 1024 * 1024;  // somebody has named this device: it may have much to say
   const auto service_of_url = url.service;
   auto answer = co_await rr::query_services(std::move(url), std::move(query));

@@ -1,10 +1,12 @@
 // Asks a device who it is. Layer: server/upstream. Source: transports spec section 3.1.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/support/node_id.hpp"
+#include "core/types/read_definitions.hpp"
 #include "node/transport/dial.hpp"
 
 namespace rrgate {
@@ -28,9 +30,14 @@ struct ProbeResult {
   bool operator==(const ProbeResult&) const = default;
 };
 
-/// Connects to the service index as the node `self_id`, asks for the services, disconnects; all of it within
-/// options.timeout.
+struct ProbeOptions {
+  rr::NodeId self_id;    ///< the node to come as
+  rr::DialOptions dial;  ///< timeout: for all that follows, too
+  std::shared_ptr<rr::ReadDefinitions> definitions;
+};
+
+/// Connects to the service index, asks for the services, disconnects.
 /// Errors   connection_error: not reached, no or a wrong answer. node_not_found: another node than the URL names.
-rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id);
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, ProbeOptions options);
 
 }  // namespace rrgate

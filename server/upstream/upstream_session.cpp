@@ -97,6 +97,7 @@ rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_
   const auto& url = device_->config().url;
   rr::ClientOptions options;
   options.service = service_;
+  options.read_definitions = device_->definitions();
   options.request_timeout = device_->request_timeout();
   options.connection.self.name = gateway_node_name;
   options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};

@@ -27,6 +27,7 @@
 #include "core/support/fifo.hpp"
 #include "core/support/spare_node.hpp"
 #include "core/types/pack.hpp"
+#include "core/types/read_definitions.hpp"
 
 namespace rr {
 
@@ -39,6 +40,8 @@ struct ClientOptions {
   /// Those of an earlier session (see ClientSession::known_definitions()), or none yet; nullopt: the service is not
   /// asked for tags, and nothing is remembered.
   std::optional<std::vector<KnownDefinitions>> known_definitions = {};
+  /// For sessions with many services that may have the same definitions; null: each session reads its own.
+  std::shared_ptr<ReadDefinitions> read_definitions = {};
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
   std::uint32_t max_memory_transfer = 1024 * 1024;    ///< bytes; larger reads and writes of memories are split

@@ -84,8 +84,10 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
       connection_.authorise();
       read_object_type(entry);
       keep_attributes(entry);
+      const auto texts = take_definitions(entry, {}, read_texts(message, entry, "servicedefs"));
       Fetch fetch;
-      for (const auto& text : take_definitions(entry, {}, read_texts(message, entry, "servicedefs"))) fetch.add(text);
+      if (!options_.read_definitions || !options_.read_definitions->find(texts, types_))
+        for (const auto& text : texts) fetch.add(text);
       return advance_fetch(std::move(fetch), now);
     }
     case EntryType::get_service_desc: {
@@ -267,6 +269,7 @@ void ClientSession::become_connected(Now) {
                                                          " has the unknown type " + quote(*chosen)));
   objects_.emplace(options_.service, type);
   options_.credentials = {};  // nothing needs the secret any more
+  if (options_.read_definitions) options_.read_definitions->keep(types_);
   state_ = ClientState::connected;
   emit(Connected{*chosen});
 }

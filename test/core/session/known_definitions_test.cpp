@@ -55,6 +55,7 @@ struct Sessions : Loopback {
     options.connection.features = features;
     options.service = service_name;
     options.known_definitions = std::move(known);
+    options.read_definitions = read;
     client = std::make_unique<ClientSession>(options, now);
     service = std::make_unique<ServiceSession>(directory, ServiceSessionOptions{}, now);
     requests.clear();
@@ -91,12 +92,27 @@ struct Sessions : Loopback {
   bool has_sent(std::string_view text) const { return answers.find(text) != std::string::npos; }
   bool has_asked(std::string_view text) const { return requests.find(text) != std::string::npos; }
 
+  std::shared_ptr<ReadDefinitions> read;  ///< null: each session reads its own
   std::string requests;
   std::string answers;
   std::string why_failed;  ///< the last request
 };
 
 const Known none_yet{std::in_place};
+
+/// Has what the last session has read.
+struct Read : ReadDefinitions {
+  bool find(const std::vector<std::string>& texts, TypeRegistry& types) override {
+    asked = texts;
+    if (kept.definitions().size() != texts.size()) return false;
+    types.share(kept);
+    return true;
+  }
+  void keep(const TypeRegistry& types) override { kept = types; }
+
+  std::vector<std::string> asked;
+  TypeRegistry kept;
+};
 
 }  // namespace
 
@@ -320,4 +336,32 @@ TEST_CASE("definitions that would take more memory than a service needs are refu
   CHECK(sessions.why_failed.empty() == (size == 7));
   if (size == 9) CHECK_THAT(sessions.why_failed, Catch::EndsWith("or have more than 8 MiB"));
   CHECK(sessions.client->state() == ClientState::connected);
+}
+
+TEST_CASE("definitions that another session has read are used as they are") {
+  Sessions sessions;
+  const auto read = std::make_shared<Read>();
+  sessions.read = read;
+  REQUIRE(sessions.open(std::nullopt));
+  CHECK(read->asked == std::vector<std::string>{hand(), parts});
+  CHECK(read->kept.find_service("test.hand") == sessions.client->types().find_service("test.hand"));
+  const auto kept = read->kept;
+
+  REQUIRE(sessions.open(std::nullopt));
+  CHECK(sessions.client->types().find_service("test.hand") == kept.find_service("test.hand"));
+  CHECK(sessions.client->types().find_service("test.parts") == kept.find_service("test.parts"));
+  CHECK(sessions.client->object_type("hand") == kept.find_entity("test.hand.Hand"));
+  // What an object behind a varobject brings is the session's alone.
+  sessions.find_finger();
+  CHECK(sessions.why_failed.empty());
+  CHECK(sessions.client->types().find_service("test.fingers"));
+  CHECK_FALSE(read->kept.find_service("test.fingers"));
+}
+
+TEST_CASE("definitions of a service that could not be connected to are not kept") {
+  Sessions sessions({parts, hand(), fingers});
+  const auto read = std::make_shared<Read>();
+  sessions.read = read;
+  REQUIRE_FALSE(sessions.open(std::nullopt, {}, "nothing"));
+  CHECK(read->kept.definitions().empty());
 }
