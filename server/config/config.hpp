@@ -91,6 +91,8 @@ struct LeaseConfig {
   LeaseNeed need_of(std::string_view member) const;
   /// Whether commands of a member pass all that keeps others waiting. `place`  as above.
   bool is_urgent(std::string_view place) const;
+  /// Whether the end of a lease of an object makes anything safe. `place`  of the object, as above.
+  bool makes_safe(std::string_view place) const;
   bool operator==(const LeaseConfig&) const = default;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
 #include "core/support/hex.hpp"
 
@@ -84,6 +85,13 @@ LeaseNeed LeaseConfig::need_of(std::string_view member) const {
 
 bool LeaseConfig::is_urgent(std::string_view place) const {
   return is_offered && need_of(place) == LeaseNeed::never;
+}
+
+bool LeaseConfig::makes_safe(std::string_view place) const {
+  const auto object = dotted(place);
+  return is_offered && std::any_of(safe.begin(), safe.end(), [&](const SafeAction& action) {
+           return rr::is_within(dotted(action.path), object);
+         });
 }
 
 }  // namespace rrgate

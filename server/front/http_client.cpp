@@ -332,8 +332,11 @@ std::function<bool(const Identity&)> who_passes(GatewayState& gateway, const Req
   auto urgent = find_urgent(gateway, request);
   if (!urgent) return {};
   return [&gateway, urgent = std::move(*urgent)](const Identity& who) {
+    const auto& rules = gateway.access().state().rules;
+    // Which object it is the path of a URL does not tell for certain.
+    if (urgent.verb == Verb::lock) return rules.extent(who, urgent.device, urgent.verb) != Extent::none;
     const AccessRequest wanted{.device = urgent.device, .service = urgent.service, .verb = urgent.verb};
-    return gateway.access().state().rules.check(who, wanted).has_value();
+    return rules.check(who, wanted).has_value();
   };
 }
 

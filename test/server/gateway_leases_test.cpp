@@ -30,6 +30,8 @@ struct LeasedRobot {
                         robot.url = rr::parse_url(node.url("Robot")).value();
                         robot.mode = DeviceMode::shared;
                         robot.leases.is_offered = true;
+                        robot.leases.safe = {{SafeAction::Kind::property, "Robot", "speed", "0"}};
+                        robot.leases.takeover = {"*"};
                         config.devices.push_back(robot);
                         config.rates = rates;
                         config.access.tokens_file = files.write("tokens", tokens("operator"));
@@ -112,4 +114,24 @@ TEST_CASE("a lease is given back however much was asked for") {
   CHECK(is_too_much("POST " + service + "?lease=release", "another"));
   CHECK(robot.end_lease(robot.ann, key) == 204);
   CHECK(is_too_much("POST " + service + "?lease=release", key));  // it is over
+}
+
+TEST_CASE("a lease that makes the device safe is taken, and given back, however much was asked for") {
+  static constexpr RateLimit few{.per_second = 5};
+  const auto rates = GENERATE(Rates{.client = few}, Rates{.user = few}, Rates{.device = few});
+  const LeasedRobot robot{rates};
+  robot.lease(robot.olga);
+  const std::string object = "POST /api/v1/devices/robot/Robot";
+  const auto use_up = [&](const std::string& first) {
+    return LeasedRobot::comes_to([&] { return robot.ask(first, robot.ann).status == 429; });
+  };
+  CHECK(use_up(object + "?lease=renew"));
+  const auto taken = robot.ask(object + "?lease=take&deadman=1000", robot.ann);
+  REQUIRE(taken.status == 200);
+  CHECK(robot.end_lease(robot.ann, nlohmann::json::parse(taken.body)["lease"]) == 204);
+  CHECK(use_up(object + "/speed?lease=take&deadman=1000"));  // of something else
+  if (!rates.device.is_bound())
+    CHECK(LeasedRobot::comes_to([&] {  // who may lock nothing
+      return robot.ask(object + "?lease=take&deadman=1000", robot.vera).status == 429;
+    }));
 }

@@ -55,6 +55,11 @@ rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, st
   co_return holder;
 }
 
+bool takes_lease(const Request& request) {
+  const auto what = rr::query_value(request.query(), "lease");
+  return what == "acquire" || what == "take";
+}
+
 std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target) {
   const auto what = target.member ? std::nullopt : request.option("lease");
   if (!what) return "";

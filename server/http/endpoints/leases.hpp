@@ -17,7 +17,10 @@ inline constexpr std::string_view lease_header = "Rrgate-Lease";
 std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target);
 /// Whether the request releases a lease that its client has: that takes no right.
 bool releases_own_lease(const ObjectRequest& request, const Target& target);
-/// The same as far as the head of the request tells: it shows the key of a lease of the object that it names.
+/// Whether the request takes a lease, if it is one for an object.
+bool takes_lease(const Request& request);
+/// Of a release, as far as the head of the request tells: whether it shows the key of a lease of the object that it
+/// names.
 bool shows_own_lease(GatewayState& gateway, const Request& request);
 /// Whose right a lease needs to last: whoever has taken it must have the right to lock; or, where the gateway holds it
 /// for a command, the gateway looks itself whether that may go on.

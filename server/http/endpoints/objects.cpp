@@ -287,10 +287,14 @@ std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& r
   const auto segments = split_path(path.substr(objects_prefix.size()));
   if (!segments || segments->size() < 2) return {};
   const bool gives_back = method == http::verb::post && shows_own_lease(gateway, request);
-  const auto* device = segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
+  const auto* device = gateway.devices().find(segments->front());
   std::string place = (*segments)[1];
   for (std::size_t i = 2; i < segments->size(); ++i) place += "." + (*segments)[i];
-  if (!gives_back && (!device || !device->config().leases.is_urgent(place))) return {};
+  const auto* leases = device ? &device->config().leases : nullptr;
+  if (leases && method == http::verb::post && takes_lease(request) && leases->makes_safe(place))
+    return UrgentCommand{(*segments)[0], (*segments)[1], Verb::lock};
+  const bool is_member = segments->size() > 2;
+  if (!gives_back && !(leases && is_member && leases->is_urgent(place))) return {};
   return UrgentCommand{(*segments)[0], (*segments)[1]};
 }
 

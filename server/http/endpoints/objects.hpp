@@ -10,8 +10,8 @@
 namespace rrgate {
 
 /// A request that neither a rate nor a lack of memory holds up, as long as somebody may `verb` the service: it commands
-/// a member of a device that is urgent (LeaseConfig::is_urgent()), gives back a lease whose key it shows, or stops all
-/// agents.
+/// a member of a device that is urgent (LeaseConfig::is_urgent()), takes a lease whose end makes something safe, gives
+/// one back whose key it shows, or stops all agents.
 struct UrgentCommand {
   std::string device = {};
   std::string service = {};
