@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "core/session/connection.hpp"
+#include "core/types/read_definitions.hpp"
 #include "node/driver/backoff.hpp"
 #include "node/transport/dial.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/log/metrics.hpp"
-#include "server/upstream/device_definitions.hpp"
 #include "server/upstream/look_pace.hpp"
 #include "server/upstream/page_link.hpp"
 #include "server/upstream/probe.hpp"
