@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "core/support/glob.hpp"
+#include "server/access/replay_name.hpp"
 
 namespace rrgate {
 
@@ -68,6 +69,21 @@ bool fits(const AccessRule& rule, const AccessRequest& what) {
          fits(rule.members, what.member);
 }
 
+AccessRequest to_record(const RecordedPlace& played) {
+  return {.device = played.device, .service = played.service, .verb = Verb::record};
+}
+
+/// A device that plays a recording is used by the rights to what was recorded; its other service, which controls it,
+/// is for those who may record that.
+AccessRequest as_recorded(AccessRequest what) {
+  const auto played = played_by(what.device);
+  if (!played) return what;
+  if (!what.service.empty() && what.service != played->service) return to_record(*played);
+  what.device = played->device;
+  what.service = played->service;
+  return what;
+}
+
 std::string describe(const Identity& who) {
   if (who.name.empty() && !who.device_user.empty())
     return rr::quote(who.device_user) + " of the device, who is no user of the gateway,";
@@ -108,14 +124,15 @@ std::optional<Verb> parse_verb(std::string_view text) {
   return static_cast<Verb>(found - std::begin(verb_names));
 }
 
-rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) const {
-  if (what.device == gateway_device && tells_of_devices(what.member) && !sees_all(who))
-    return denied(who, describe(what) + ", which tells of all devices: no rule gives something of all devices");
-  if (is_agent(who) && is_command(what.verb)) {
-    if (terms(who, what)) return {};
-    return denied(who, describe(what) + ": no rule with \"agent\" gives it");
+rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& asked) const {
+  if (asked.device == gateway_device && tells_of_devices(asked.member) && !sees_all(who))
+    return denied(who, describe(asked) + ", which tells of all devices: no rule gives something of all devices");
+  if (is_agent(who) && is_command(asked.verb)) {
+    if (terms(who, asked)) return {};
+    return denied(who, describe(asked) + ": no rule with \"agent\" gives it");
   }
   if (may_all(who)) return {};
+  const auto what = as_recorded(asked);
   const auto given = [](std::string_view text) { return text.empty() ? std::nullopt : std::optional(text); };
   if (what.verb == Verb::read && what.member.empty())
     return sees(who, what.device, given(what.service), given(what.path)) ? rr::Result<>() : denied(who, describe(what));
@@ -128,6 +145,7 @@ rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) 
 
 std::optional<AgentTerms> AccessRules::terms(const Identity& who, const AccessRequest& what) const {
   std::optional<AgentTerms> out;
+  if (is_replay(what.device)) return out;  // it takes no commands but those of who looks at it
   for (const auto& rule : rules_) {
     if (!rule.agent || !gives(rule, what.verb) || !is_for(rule, who) || !fits(rule, what)) continue;
     if (out)
@@ -142,6 +160,10 @@ Extent AccessRules::extent(const Identity& who, std::string_view device, Verb ve
   const bool needs_agent_rule = is_agent(who) && is_command(verb);
   if (may_all(who) && !needs_agent_rule) return Extent::all;
   auto out = Extent::none;
+  if (const auto played = played_by(device)) {
+    if (!needs_agent_rule) out = extent(who, played->device, verb);
+    return out == Extent::all && !check(who, to_record(*played)) ? Extent::some : out;
+  }
   for (const auto& rule : rules_) {
     if (!gives(rule, verb) || !is_for(rule, who) || !fits(rule.devices, device)) continue;
     if (needs_agent_rule && !rule.agent) continue;
@@ -181,6 +203,10 @@ bool AccessRules::gives_any(const Identity& who, Verb verb) const {
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
   if (may_all(who)) return true;
+  if (const auto played = played_by(device)) {
+    if (service && *service != played->service) return check(who, to_record(*played)).has_value();
+    return sees(who, played->device, played->service, path);
+  }
   if (!path) path = service;  // its root object: all others are below
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
     return gives_something(rule, who) && fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&

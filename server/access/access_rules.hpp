@@ -70,7 +70,8 @@ struct AccessRule {
 };
 
 /// Commands of agents, who come by Face::mcp, are given by rules with `agent` alone, whatever else gives them to
-/// others: nobody moves a device by what he reads unless an operator has said so. Never changes once made.
+/// others: nobody moves a device by what he reads unless an operator has said so. A device that plays a recording
+/// (replay_name.hpp) is judged by the rules for the device and service that were recorded. Never changes once made.
 class AccessRules {
  public:
   /// Everybody may do everything.
@@ -84,7 +85,7 @@ class AccessRules {
   /// object, since it is on the way there. Members of gateway_device that tell of devices are for those who may do
   /// something with everything of all devices. Errors   permission_denied: a sentence that says who may not do what,
   /// for the client.
-  [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
+  [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& asked) const;
   /// On which terms an agent may write or call something: those of all rules that give it together. nullopt: it may
   /// not, or is no agent.
   std::optional<AgentTerms> terms(const Identity& who, const AccessRequest& what) const;

@@ -4,6 +4,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "core/session/service_path.hpp"
+#include "server/access/replay_name.hpp"
 #include "server/front/session_end.hpp"
 #include "server/log/log.hpp"
 #include "server/rr/shared_access.hpp"
@@ -197,7 +198,8 @@ auto explain_missing(GatewayState& gateway, const Connection& connection, const 
   return [&gateway, who = connection.identity, device_of_node](std::string_view service) -> std::optional<rr::Error> {
     for (const auto& device : gateway.devices().all()) {
       const auto& name = device->config().name;
-      const bool is_meant = device_of_node.empty() ? gateway.access().sees(who, name) : name == device_of_node;
+      const bool is_meant =
+          device_of_node.empty() ? !is_replay(name) && gateway.access().sees(who, name) : name == device_of_node;
       if (!is_meant || !device->is_shared()) continue;
       const auto session = device->find_shared(std::string(service));
       if (auto failure = session ? (*session)->failure() : std::nullopt) return failure;

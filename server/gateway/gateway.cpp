@@ -15,6 +15,7 @@
 #include "core/session/service/service_index.hpp"
 #include "node/transport/accept_all.hpp"
 #include "node/transport/socket_stream.hpp"
+#include "server/access/replay_name.hpp"
 #include "server/config/access_options.hpp"
 #include "server/front/front_door.hpp"
 #include "server/gateway/routes.hpp"
@@ -144,6 +145,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
 }
 
 /// The service index leads to all devices: to a shared one by the node that stands for it, to others through the relay.
+/// Not to those that play recordings: who looks for services of a type wants what is there now.
 void Gateway::tell_of_nodes() {
   auto& directory = shared_.node().directory();
   const auto index_url = [](std::string_view base_url, const rr::NodeIdentity& node) {
@@ -153,6 +155,7 @@ void Gateway::tell_of_nodes() {
   const auto routed = [this, index_url](std::string_view base_url) {
     std::vector<rr::KnownNode> out;
     for (const auto& device : devices_.all()) {
+      if (is_replay(device->config().name)) continue;
       auto* shared = shared_.find(*device);
       const auto& identity = device->identity();
       if (!shared && !identity) continue;

@@ -62,7 +62,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {get, "/api/v1/recordings", recordings_endpoint(gateway)},
       {post, "/api/v1/recordings", with_body(begin_recording_endpoint(gateway))},
       {get, "/api/v1/recordings/*", recording_endpoint(gateway)},
-      {post, "/api/v1/recordings/*", with_body(stop_recording_endpoint(gateway))},
+      {post, "/api/v1/recordings/*", with_body(recording_action_endpoint(gateway))},
       {delete_, "/api/v1/recordings/*", delete_recording_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
       {get, "/api/v1/audit", audit_endpoint(gateway)},

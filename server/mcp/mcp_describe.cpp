@@ -6,6 +6,7 @@
 
 #include "core/support/utf8.hpp"
 #include "core/support/whole_number.hpp"
+#include "server/access/replay_name.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/json/schema.hpp"
 
@@ -151,6 +152,7 @@ rr::OrderedJson device_for_agent(GatewayState& gateway, const Identity& who, con
   rr::add_key(out, "name") = name;
   rr::add_key(out, "state") = std::string(to_string(device.state()));
   rr::add_key(out, "mode") = device.is_shared() ? "shared" : "relay";
+  if (is_replay(name)) rr::add_key(out, "plays_recording") = true;
   auto said = rr::OrderedJson::object();
   auto services = rr::OrderedJson::array();
   if (!device.last_error().empty()) rr::add_key(said, "last_error") = bounded_text(device.last_error());

@@ -139,6 +139,7 @@ rr::Result<> Recording::take_chunk(const McapRecord& record) {
   auto records = McapChunkReader::open(record);
   if (!records) return records.error();
   RecordedChunk chunk{record.offset};
+  chunk.bytes = record.content.size();
   for (;;) {
     const auto inner = records->next();
     if (!inner) return inner.error();
@@ -165,6 +166,17 @@ rr::Result<> Recording::take_chunk(const McapRecord& record) {
   message_count_ += chunk.message_count;
   chunks_.push_back(std::move(chunk));
   return {};
+}
+
+std::size_t Recording::memory() const {
+  constexpr std::size_t node_bytes = 64;  // of a map
+  std::size_t out = 0;
+  std::size_t largest = 0;
+  for (const auto& chunk : chunks_) {
+    out += sizeof(chunk) + chunk.message_counts.size() * node_bytes;
+    largest = std::max(largest, chunk.bytes + static_cast<std::size_t>(chunk.message_count) * sizeof(McapMessage));
+  }
+  return out + 2 * largest;  // the reader has its bytes, and who reads them has
 }
 
 rr::Result<Recording::Messages> Recording::read(const RecordedChunk& chunk) {

@@ -30,6 +30,7 @@ struct RecordedChunk {
   McapTime last = 0;
   std::uint64_t message_count = 0;
   std::map<std::uint16_t, std::uint64_t> message_counts;  ///< by channel
+  std::size_t bytes = 0;
 };
 
 class Recording {
@@ -47,6 +48,8 @@ class Recording {
   const std::string& cut() const { return reader_.cut(); }
   const std::string& path() const { return reader_.path(); }
   std::uint64_t size() const { return reader_.size(); }
+  /// Bytes that are held for it, about, also while a chunk is read.
+  std::size_t memory() const;
 
   struct Messages {
     rr::Bytes bytes;  ///< what the messages borrow

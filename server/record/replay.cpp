@@ -12,6 +12,8 @@ namespace rrgate {
 
 namespace {
 
+constexpr std::string_view in_process = "rr+intra:///";
+
 rr::TimeSpec to_time_spec(McapTime time) {
   constexpr McapTime second = 1'000'000'000u;
   return {static_cast<std::int64_t>(time / second), static_cast<std::int32_t>(time % second)};
@@ -73,7 +75,7 @@ Replay::Replay(boost::asio::io_context& io, Recording recording, ReplayOptions o
     auto& node = node_of(recorded);
     node.node->add(service->service());
     node.services.insert(recorded.service);
-    urls_.push_back(node.address + "/?service=" + rr::percent_encode(recorded.service));
+    urls_.push_back(node.address + "service=" + rr::percent_encode(recorded.service));
     services_.push_back(std::move(*service));
   }
   tell_state();
@@ -88,15 +90,23 @@ Replay::Node& Replay::node_of(const RecordedService& recorded) {
     if (!node.services.contains(recorded.service)) return node;
     is_further = true;
   }
-  const auto address = address_of(options_.listen, nodes_.size());
   rr::NodeOptions how;
   if (options_.keeps_ids && !is_further) how.id = recorded.node.id;
   how.report = [this](const std::string& problem) { report(problem); };
   auto node = std::make_unique<rr::Node>(io_, recorded.node.name, how);
   add_control(*node);
-  const auto port = node->listen(address.listen);
-  nodes_.push_back({recorded.node, std::move(node), address.reach + ":" + std::to_string(port)});
+  auto address = listen(*node);
+  nodes_.push_back({recorded.node, std::move(node), std::move(address)});
   return nodes_.back();
+}
+
+std::string Replay::listen(rr::Node& node) const {
+  if (options_.listen == in_process) {
+    node.listen(in_process);
+    return node.listen_urls().front() + "&";
+  }
+  const auto address = address_of(options_.listen, nodes_.size());
+  return address.reach + ":" + std::to_string(node.listen(address.listen)) + "/?";
 }
 
 void Replay::add_control(rr::Node& node) {

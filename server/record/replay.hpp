@@ -15,7 +15,8 @@
 namespace rrgate {
 
 struct ReplayOptions {
-  std::string listen = "rr+tcp://127.0.0.1:0";  ///< of the first node; the others take the ports behind it
+  /// Of the first node; the others take the ports behind it. "rr+intra:///": for clients of this process.
+  std::string listen = "rr+tcp://127.0.0.1:0";
   /// Nodes have the NodeIDs of those that were recorded, which then must not run beside them.
   bool keeps_ids = false;
   /// What could not be played: each member once.
@@ -43,10 +44,12 @@ class Replay {
   struct Node {
     rr::NodeIdentity recorded;
     std::unique_ptr<rr::Node> node;
-    std::string address;                  ///< "rr+tcp://127.0.0.1:52222"
+    std::string address;                  ///< "rr+tcp://127.0.0.1:52222/?": what follows names the service
     std::set<std::string> services = {};  ///< by name; without the one that controls it
   };
   Node& node_of(const RecordedService& recorded);
+  /// Returns  its address.
+  std::string listen(rr::Node& node) const;
   void add_control(rr::Node& node);
   ReplayedService& service_of(std::uint16_t channel);
   void play(const McapMessage& message, McapTime shift);

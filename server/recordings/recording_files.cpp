@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "node/platform/utc_time.hpp"
+#include "server/access/replay_name.hpp"
 #include "server/json/json.hpp"
 #include "server/record/recording.hpp"
 
@@ -103,6 +104,14 @@ std::optional<RecordingFile> look_at(const fs::directory_entry& entry, std::stri
 std::string recording_of_file(std::string_view file) {
   std::string name;
   return number_of_file(file, name) > 0 && parse_recording_name(name) ? name : std::string();
+}
+
+std::string replay_of_file(std::string_view file) {
+  return replay_name(file.substr(0, file.rfind(extension)));
+}
+
+std::string recording_of_replay(std::string_view device) {
+  return is_replay(device) ? recording_of_file(first_file_of(device.substr(replay_prefix.size()))) : std::string();
 }
 
 RecordingFiles look_into(const std::string& folder, std::string_view recording) {

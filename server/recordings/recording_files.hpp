@@ -37,6 +37,11 @@ std::string first_file_of(std::string_view recording);
 /// The recording that a file of this name is of; empty: of none.
 std::string recording_of_file(std::string_view file);
 
+/// The device that plays a file of a recording.
+std::string replay_of_file(std::string_view file);
+/// The recording that a device plays a file of; empty: it plays none.
+std::string recording_of_replay(std::string_view device);
+
 /// Of recordings by their names, each list oldest first.
 using RecordingFiles = std::map<std::string, std::vector<RecordingFile>, std::less<>>;
 /// `recording`  whose files are looked for; empty: of all. What can't be read is left out.

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <unordered_map>
 
+#include "server/access/replay_name.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
 
@@ -97,8 +98,14 @@ struct Recordings::Folder {
 };
 
 Recordings::Recordings(const asio::any_io_executor& executor, const Config& config, DeviceRegistry& devices,
-                       ValueClients& clients, Workers& workers)
-    : executor_(executor), config_(config), devices_(devices), clients_(clients), workers_(workers), timer_(executor) {}
+                       ValueClients& clients, Workers& workers, MemoryBudget::Charge memory)
+    : executor_(executor),
+      config_(config),
+      devices_(devices),
+      clients_(clients),
+      workers_(workers),
+      replays_(executor, devices, std::move(memory)),
+      timer_(executor) {}
 
 Recordings::~Recordings() {
   stop();
@@ -116,6 +123,7 @@ void Recordings::follow_config() {
     else if (auto why = why_device_is_gone(*run))
       end_run(*run, std::move(why));
   }
+  replays_.keep_folder(config_.recordings.folder);
   next_standing_ = steady_clock::now();
   timer_.cancel();
   wake();
@@ -241,6 +249,8 @@ rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, Paths* 
     return rr::make_error(rr::ErrorCode::invalid_state, "the gateway has no \"recordings\" in its configuration");
   auto* device = devices_.find(wish.device);
   if (!device) return rr::make_error(rr::ErrorCode::resource_not_found, "no device " + rr::quote(wish.device));
+  if (is_replay(wish.device))
+    return rr::make_error(rr::ErrorCode::invalid_state, rr::quote(wish.device) + " plays a recording already");
   const auto is_name_char = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
   };
@@ -399,6 +409,7 @@ void Recordings::tick(Folder& folder) {
 
 void Recordings::stop() {
   is_stopped_ = true;
+  replays_.stop();
   timer_.cancel();
   for (auto& [name, run] : runs_)
     if (run->writer) end_run(*run, std::nullopt);
@@ -422,6 +433,7 @@ rr::awaitable<rr::Result<>> Recordings::remove(std::string name) {
       co_return rr::make_error(rr::ErrorCode::invalid_state, "the recording is under way; stop it first");
     runs_.erase(run);
   }
+  for (const auto& file : info->files) replays_.end(replay_of_file(file.name));
   const auto work = [files = info->files, where = config_.recordings.folder]() -> rr::Result<> {
     for (const auto& file : files) {
       std::error_code error;

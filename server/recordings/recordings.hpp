@@ -18,6 +18,7 @@
 #include "server/limits/workers.hpp"
 #include "server/recordings/device_recorder.hpp"
 #include "server/recordings/recording_files.hpp"
+#include "server/recordings/replays.hpp"
 #include "server/upstream/device_registry.hpp"
 
 namespace rrgate {
@@ -54,23 +55,27 @@ inline AccessRequest wanted_of(const RecordingInfo& recording) {
 /// Folders are looked into, and files deleted for clients, on other threads.
 class Recordings {
  public:
-  /// All outlive it, but for `workers`, which may go first.
+  /// All outlive it, but for `workers`, which may go first. `memory`  of what plays recordings.
   Recordings(const boost::asio::any_io_executor& executor, const Config& config, DeviceRegistry& devices,
-             ValueClients& clients, Workers& workers);
+             ValueClients& clients, Workers& workers, MemoryBudget::Charge memory);
   ~Recordings();
 
   /// Begins what the configuration wants, soon; again when that, or a device, has changed.
   void follow_config();
-  /// Completes all files.
+  /// Completes all files, and ends what is played.
   void stop();
+  /// Those that are played.
+  Replays& replays() { return replays_; }
 
-  /// Returns its name. Errors   invalid_state: the configuration has no folder; resource_not_found: no such device;
+  /// Returns its name. Errors   invalid_state: the configuration has no folder, or the device plays a recording;
+  /// resource_not_found: no such device;
   /// out_of_system_resource: too many, or the folder is full; system_resource_error: the file, and what the system
   /// says.
   rr::awaitable<rr::Result<std::string>> begin(RecordingWish wish);
   /// One that is not under way stays as it is. Errors   invalid_state: the configuration wants it.
   rr::Result<> end(std::string_view name);
-  /// Its files too. Errors   resource_not_found; invalid_state: it is under way; system_resource_error.
+  /// Its files too, which are played no more. Errors   resource_not_found; invalid_state: it is under way;
+  /// system_resource_error.
   rr::awaitable<rr::Result<>> remove(std::string name);
 
   /// Those that somebody may have, the newest first.
@@ -121,6 +126,7 @@ class Recordings {
   DeviceRegistry& devices_;
   ValueClients& clients_;
   Workers& workers_;
+  Replays replays_;
   std::map<std::string, std::unique_ptr<Run>, std::less<>> runs_;  ///< since the gateway started
   boost::asio::steady_timer timer_;
   std::chrono::steady_clock::time_point next_standing_{};  ///< when those that are not under way are begun again

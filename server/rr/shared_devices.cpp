@@ -4,6 +4,7 @@
 #include <boost/uuid/name_generator_sha1.hpp>
 
 #include "core/session/service/service_index.hpp"
+#include "server/access/replay_name.hpp"
 
 namespace rrgate {
 
@@ -66,7 +67,9 @@ void SharedDevice::refresh() {
   const bool have_gone = services_.size() < before;
   for (const auto& service : identity->services) {
     if (service.name == rr::service_index_name || services_.contains(service.name)) continue;
-    const std::vector<ServiceBoard*> boards{&node_, &gateway_node_};
+    std::vector<ServiceBoard*> boards{&node_};
+    // Who asks the gateway for a service by its name alone wants the device, not what was recorded of it.
+    if (!is_replay(device_->config().name)) boards.push_back(&gateway_node_);
     const auto shared = std::make_shared<SharedService>(device_, service.name, boards);
     services_.emplace(service.name, shared);
     shared->start(config_.timeouts.unused_session);

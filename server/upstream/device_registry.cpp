@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/access/replay_name.hpp"
+
 namespace rrgate {
 
 namespace asio = boost::asio;
@@ -10,7 +12,8 @@ namespace asio = boost::asio;
 namespace {
 
 bool is_configured(const Device& device) {
-  return !device.config().is_found && !device.config().is_served;
+  const auto& config = device.config();
+  return !config.is_found && !config.is_served && !is_replay(config.name);
 }
 
 }  // namespace
@@ -68,7 +71,7 @@ void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
   for (const auto& device : before) {
     if (has(*device)) continue;
     const auto& config = device->config();
-    if ((config.is_found || config.is_served) && !find(config.name)) {
+    if (!is_configured(*device) && !find(config.name)) {
       device->become(config, config_);
       devices_.push_back(device);
     } else {
@@ -140,9 +143,11 @@ Device* DeviceRegistry::find_configured(const rr::NodeId& node_id) const {
 
 Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_name) const {
   if (node_id.is_any() && node_name.empty()) {
-    const auto choices =
-        config_.devices.empty() ? devices_.size() : config_.devices.size();  // configured ones are first
-    return choices == 1 ? devices_.front().get() : nullptr;
+    const auto is_choice = [this](const auto& device) {
+      return config_.devices.empty() ? !is_replay(device->config().name) : is_configured(*device);
+    };
+    if (std::count_if(devices_.begin(), devices_.end(), is_choice) != 1) return nullptr;
+    return std::find_if(devices_.begin(), devices_.end(), is_choice)->get();
   }
   Device* away = nullptr;
   for (const auto& device : devices_) {

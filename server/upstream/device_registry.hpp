@@ -26,7 +26,7 @@ class DeviceRegistry {
   /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
   /// ones. Errors   as load_tls(); nothing has changed.
   [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
-  /// Takes what prepare() made, once the configuration has been replaced. Found devices and pages stay
+  /// Takes what prepare() made, once the configuration has been replaced. Devices that are not configured stay
   /// whose names no other device has now.
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
@@ -37,7 +37,7 @@ class DeviceRegistry {
   std::uint64_t changes() const { return changes_; }
   /// Called when devices have joined or gone.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
-  /// A device that is found or a page joins; its name is nobody's yet.
+  /// A device that is found, is a page or plays a recording joins; its name is nobody's yet.
   Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page = nullptr);
   /// Such a device goes; clients that are connected to it stay so.
   void remove(const Device& device);
@@ -48,8 +48,8 @@ class DeviceRegistry {
   /// The configured device that is this node, as far as is known. Null when there is none.
   Device* find_configured(const rr::NodeId& node_id) const;
   /// The device that a client asks for by node id and name (any id and "" ask for none in particular: it gets the only
-  /// configured device, or where none is configured the only one). Of several that are this node, the first that is
-  /// online. Null when there is none.
+  /// configured device, or where none is configured the only one that plays no recording). Of several that are this
+  /// node, the first that is online. Null when there is none.
   Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
 
  private:

@@ -101,17 +101,17 @@ TEST_CASE("a device may be stopped between any two turns of its loop while it is
   }
 }
 
-TEST_CASE("found devices and pages follow what a reload says of all devices") {
+TEST_CASE("devices that are not configured stay at a reload, and follow what it says of all devices") {
   boost::asio::io_context io{1};
   Config config;
   DeviceRegistry registry(io.get_executor(), config);
   std::vector<const Device*> devices;
-  for (const bool is_found : {true, false}) {
+  for (const auto* name : {"found", "page", "replay~arm.x.20261125T083000123Z"}) {
     DeviceConfig made;
-    made.name = is_found ? "found" : "page";
+    made.name = name;
     made.url = rr::parse_url("rr+tcp://127.0.0.1:1/?service=x").value();
-    made.is_found = is_found;
-    made.is_served = !is_found;
+    made.is_found = made.name == "found";
+    made.is_served = made.name == "page";
     devices.push_back(&registry.add(std::move(made), nullptr));
   }
   config.timeouts.request = milliseconds(1234);
@@ -123,6 +123,26 @@ TEST_CASE("found devices and pages follow what a reload says of all devices") {
     CHECK(device->retry() == config.retry);
   }
   registry.stop();
+  io.run();
+}
+
+TEST_CASE("who asks for no device in particular gets none that plays a recording") {
+  boost::asio::io_context io{1};
+  const Config config;
+  DeviceRegistry registry(io.get_executor(), config);
+  const auto add = [&](const char* name) {
+    DeviceConfig made;
+    made.name = name;
+    made.url = rr::parse_url("rr+tcp://127.0.0.1:1/?service=x").value();
+    made.is_found = made.name == "found";
+    return &registry.add(std::move(made), nullptr);
+  };
+  const auto* replay = add("replay~arm.x.20261125T083000123Z");
+  CHECK(registry.route({}, {}) == nullptr);
+  const auto* found = add("found");
+  CHECK(registry.route({}, {}) == found);
+  registry.remove(*found);
+  registry.remove(*replay);
   io.run();
 }
 

@@ -36,7 +36,9 @@ std::vector<std::string> paths_of(const Route& route) {
   } else if (route.pattern == "/api/v1/agents/approvals/*") {
     out = {"/api/v1/agents/approvals/{approval}"};
   } else if (route.pattern == "/api/v1/recordings/*") {
-    out = {std::string("/api/v1/recordings/{recording}") + (route.method == http::verb::post ? "/stop" : "")};
+    const std::string recording = "/api/v1/recordings/{recording}";
+    out = {recording + (route.method == http::verb::post ? "/stop" : "")};
+    if (route.method != http::verb::get) out.push_back(recording + "/play");
   } else if (route.pattern == "/devices/*") {
     out = {"/devices/{device}"};
   } else if (route.pattern != "/api/*" && route.pattern != "/*" && !route.pattern.starts_with("/docs")) {

@@ -4,6 +4,7 @@
 
 #include "core/session/service_path.hpp"
 #include "node/http/upgrade.hpp"
+#include "server/recordings/recording_files.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
 
@@ -39,6 +40,9 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
   out["mode"] = device.is_shared() ? "shared" : "relay";
   out["found"] = device.config().is_found;
   out["served"] = device.config().is_served;
+  out["recording"] = nullptr;
+  if (const auto recording = recording_of_replay(device.config().name); !recording.empty())
+    out["recording"] = recording;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
   const auto& identity = device.identity();

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/session/service/service_index.hpp"
+#include "server/access/replay_name.hpp"
 #include "server/access/standing.hpp"
 #include "server/http/endpoints/gateway_request.hpp"
 #include "server/http/response_writer.hpp"
@@ -21,8 +22,9 @@ using Json = rr::OrderedJson;
 constexpr std::size_t most_members = 64;
 constexpr std::size_t longest_pattern = 256;
 constexpr std::string_view stop_suffix = "/stop";
+constexpr std::string_view play_suffix = "/play";
 
-Json described(const RecordingInfo& recording) {
+Json described(GatewayState& gateway, const RecordingInfo& recording) {
   const auto seconds = [](auto duration) {
     return static_cast<double>(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) / 1000;
   };
@@ -38,7 +40,11 @@ Json described(const RecordingInfo& recording) {
   out["messages"] = recording.messages ? Json(*recording.messages) : Json();
   out["bytes"] = recording.bytes();
   auto& files = out["files"] = Json::array();
-  for (const auto& file : recording.files) files.push_back({{"name", file.name}, {"bytes", file.bytes}});
+  for (const auto& file : recording.files) {
+    const auto replay = replay_of_file(file.name);
+    const bool is_playing = gateway.recordings().replays().is_playing(replay);
+    files.push_back({{"name", file.name}, {"bytes", file.bytes}, {"replay", is_playing ? Json(replay) : Json()}});
+  }
   return out;
 }
 
@@ -144,7 +150,7 @@ RecordingsAnswer begin_recording(GatewayState& gateway, const Request& request) 
   if (!begun) co_return failure_answer(begun.error());
   const auto recording = co_await gateway.recordings().find(*begun);
   if (!recording) co_return failure_answer(rr::make_error(rr::ErrorCode::resource_not_found, "it was deleted already"));
-  auto response = json_answer(201, described(*recording));
+  auto response = json_answer(201, described(gateway, *recording));
   response.set("Location", request.arrival.prefix + "/api/v1/recordings/" + *begun);
   co_return response;
 }
@@ -169,7 +175,7 @@ Response answer_recorded(const AuditEntryPtr& entry, std::string_view name, cons
 RecordingsAnswer look_at_recording(GatewayState& gateway, const Request& request, std::string name) {
   const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
   if (!found) co_return refuse_finder(gateway, request, found.error());
-  auto response = json_answer(200, described(*found));
+  auto response = json_answer(200, described(gateway, *found));
   response.set("Cache-Control", "no-store");
   co_return response;
 }
@@ -180,7 +186,7 @@ RecordingsAnswer stop_recording(GatewayState& gateway, const Request& request, s
   const auto entry = begin_entry(gateway, request, *found, "recording_stopped");
   const auto done = gateway.recordings().end(name);
   const auto now = co_await gateway.recordings().find(name);
-  co_return answer_recorded(entry, name, done, json_answer(200, described(now.value_or(*found))));
+  co_return answer_recorded(entry, name, done, json_answer(200, described(gateway, now.value_or(*found))));
 }
 
 RecordingsAnswer delete_recording(GatewayState& gateway, const Request& request, std::string name) {
@@ -193,6 +199,79 @@ RecordingsAnswer delete_recording(GatewayState& gateway, const Request& request,
   co_return answer_recorded(entry, name, done, std::move(response));
 }
 
+/// What a path names: a recording, or one of its files.
+struct RecordingPlace {
+  std::string name;
+  std::string file;  ///< empty: the recording
+};
+
+RecordingPlace place_of(std::string_view text) {
+  auto name = recording_of_file(text);
+  if (name.empty()) return {std::string(text), {}};
+  return {std::move(name), std::string(text)};
+}
+
+/// Null: it has no such file.
+const RecordingFile* find_file(const RecordingInfo& recording, std::string_view file) {
+  const auto found = std::find_if(recording.files.begin(), recording.files.end(),
+                                  [file](const auto& each) { return each.name == file; });
+  return found == recording.files.end() ? nullptr : &*found;
+}
+
+Response no_such_file(const std::string& file) {
+  return problem_response(404, "the recording has no file" + (file.empty() ? file : " " + rr::quote(file)));
+}
+
+/// Those that are played, as far as somebody may end them.
+std::string names_of_replays(GatewayState& gateway, const Identity& who) {
+  std::string out;
+  std::size_t others = 0;
+  for (const auto& device : gateway.recordings().replays().list()) {
+    const auto played = played_by(device);
+    const AccessRequest wanted{.device = played->device, .service = played->service, .verb = Verb::record};
+    if (gateway.access().state().rules.check(who, wanted))
+      out += (out.empty() ? "" : ", ") + device;
+    else
+      ++others;
+  }
+  if (others == 0) return out;
+  return out + (out.empty() ? "" : " and ") + std::to_string(others) + " of others";
+}
+
+RecordingsAnswer play_recording(GatewayState& gateway, const Request& request, RecordingPlace place) {
+  auto& recordings = gateway.recordings();
+  const auto found = co_await recordings.find_for(gateway.access(), request.identity, place.name);
+  if (!found) co_return refuse_finder(gateway, request, found.error());
+  const auto* first = found->files.empty() ? nullptr : &found->files.front();
+  const auto* file = place.file.empty() ? first : find_file(*found, place.file);
+  if (!file) co_return no_such_file(place.file);
+  const auto device = replay_of_file(file->name);
+  const bool is_new = !recordings.replays().is_playing(device);
+  const auto entry = begin_entry(gateway, request, *found, "recording_played");
+  auto begun = co_await recordings.replays().play(gateway.config().recordings.folder, file->name);
+  const auto why = begun ? rr::Error{} : begun.error();
+  if (why.code == rr::ErrorCode::invalid_state)
+    begun = rr::make_error(why.code, why.message + ": " + names_of_replays(gateway, request.identity));
+  if (why.code == rr::ErrorCode::data_serialization_error)  // the file's fault, not that of who asks
+    begun = rr::make_error(rr::ErrorCode::invalid_state, why.message);
+  auto response = json_answer(is_new ? 201 : 200, Json{{"device", device}});
+  response.set("Location", request.arrival.prefix + "/api/v1/devices/" + device);
+  co_return answer_recorded(entry, found->name, begun, std::move(response));
+}
+
+RecordingsAnswer end_playing(GatewayState& gateway, const Request& request, RecordingPlace place) {
+  const auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, place.name);
+  if (!found) co_return refuse_finder(gateway, request, found.error());
+  if (!place.file.empty() && !find_file(*found, place.file)) co_return no_such_file(place.file);
+  const auto entry = begin_entry(gateway, request, *found, "recording_play_ended");
+  for (const auto& file : found->files)
+    if (place.file.empty() || file.name == place.file) gateway.recordings().replays().end(replay_of_file(file.name));
+  const rr::Result<> done;
+  Response response;
+  response.status = 204;
+  co_return answer_recorded(entry, found->name, done, std::move(response));
+}
+
 RecordingsAnswer list_recordings(GatewayState& gateway, const Request& request) {
   const auto& limits = gateway.config().recordings;
   Json out;
@@ -202,7 +281,7 @@ RecordingsAnswer list_recordings(GatewayState& gateway, const Request& request) 
   const auto recordings = co_await gateway.recordings().list(gateway.access().state_ptr(), request.identity);
   for (const auto& each : recordings) {
     bytes += each.bytes();
-    list.push_back(described(each));
+    list.push_back(described(gateway, each));
   }
   out["bytes"] = bytes;
   out["max_bytes"] = limits.max_bytes;
@@ -262,18 +341,9 @@ rr::awaitable<void> send_file(GatewayState& gateway, ResponseWriter& writer, std
 rr::awaitable<void> send_download(GatewayState& gateway, ResponseWriter& writer, std::string name, std::string file) {
   const auto& request = writer.request();
   auto found = co_await gateway.recordings().find_for(gateway.access(), request.identity, name);
-  Response refusal;
-  const RecordingFile* wanted = nullptr;
-  if (found) {
-    const auto& files = found->files;
-    const auto it = std::find_if(files.begin(), files.end(), [&](const auto& each) { return each.name == file; });
-    if (it != files.end()) wanted = &*it;
-  }
-  if (!found)
-    refusal = refuse_finder(gateway, request, found.error());
-  else if (!wanted)
-    refusal = problem_response(404, "the recording has no file " + rr::quote(file));
+  const auto* wanted = found ? find_file(*found, file) : nullptr;
   if (!wanted) {
+    const auto refusal = found ? no_such_file(file) : refuse_finder(gateway, request, found.error());
     co_await writer.send(refusal);
     co_return;
   }
@@ -319,9 +389,16 @@ Handler recording_endpoint(GatewayState& gateway) {
   };
 }
 
-Handler stop_recording_endpoint(GatewayState& gateway) {
+Handler recording_action_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view rest) {
-    if (!rest.ends_with(stop_suffix)) return problem_response(404, "expected /api/v1/recordings/NAME/stop");
+    if (rest.ends_with(play_suffix)) {
+      rest.remove_suffix(play_suffix.size());
+      return make_later([&gateway, place = place_of(rest)](const Request& request) {
+        return play_recording(gateway, request, place);
+      });
+    }
+    if (!rest.ends_with(stop_suffix))
+      return problem_response(404, "expected /api/v1/recordings/NAME/stop or /api/v1/recordings/NAME/play");
     rest.remove_suffix(stop_suffix.size());
     return make_later([&gateway, name = std::string(rest)](const Request& request) {
       return stop_recording(gateway, request, name);
@@ -331,6 +408,11 @@ Handler stop_recording_endpoint(GatewayState& gateway) {
 
 Handler delete_recording_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view rest) {
+    if (rest.ends_with(play_suffix)) {
+      rest.remove_suffix(play_suffix.size());
+      return make_later(
+          [&gateway, place = place_of(rest)](const Request& request) { return end_playing(gateway, request, place); });
+    }
     return make_later([&gateway, name = std::string(rest)](const Request& request) {
       return delete_recording(gateway, request, name);
     });

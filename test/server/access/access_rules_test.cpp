@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 
+#include "server/access/replay_name.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
@@ -413,4 +414,80 @@ TEST_CASE("verbs by name") {
   for (const auto verb : all_verbs) CHECK(parse_verb(to_string(verb)) == verb);
   CHECK_FALSE(parse_verb("execute"));
   CHECK_FALSE(parse_verb(""));
+}
+
+TEST_CASE(
+    "rights: what plays a recording is used by the rights to what was recorded, and controlled by those who may "
+    "record") {
+  const std::string replay = "replay~lab.arm.Arm.20261125T083000123Z";
+  const auto viewer = who("vera", {"viewer"});
+  const auto operators = who("alice", {"operator"});
+  const auto stranger = who("eve", {"other"});
+  AccessRule look;
+  look.roles = {"viewer", "operator"};
+  look.devices = {"lab.arm"};
+  look.paths = {"Arm.axes*"};
+  look.may = {Verb::read, Verb::subscribe};
+  AccessRule record;
+  record.roles = {"operator"};
+  record.devices = {"lab.arm"};
+  record.services = {"Arm"};
+  record.may = {Verb::record};
+  AccessRule elsewhere;  // its name is no reason
+  elsewhere.roles = {"other"};
+  elsewhere.devices = {"replay*", "lab", "arm"};
+  elsewhere.may = {Verb::read, Verb::subscribe, Verb::call, Verb::record};
+  AccessRule agents = elsewhere;
+  agents.roles = {"operator"};
+  agents.devices = {"*"};
+  agents.agent = AgentTerms{};
+  const AccessRules rules({look, record, elsewhere, agents}, true);
+
+  const auto may = [&](const Identity& who_asks, std::string_view service, std::string_view path, Verb verb) {
+    return rules.check(who_asks, {.device = replay, .service = service, .path = path, .member = "x", .verb = verb})
+        .has_value();
+  };
+  CHECK(may(viewer, "Arm", "Arm.axes[1]", Verb::subscribe));
+  CHECK_FALSE(may(viewer, "Arm", "Arm", Verb::subscribe));
+  CHECK_FALSE(may(viewer, "Arm", "Arm.axes[1]", Verb::call));
+  for (const auto verb : {Verb::read, Verb::write, Verb::call, Verb::subscribe, Verb::lock}) {
+    CHECK(may(operators, "replay", "replay", verb));
+    CHECK_FALSE(may(viewer, "replay", "replay", verb));
+    CHECK_FALSE(may(stranger, "replay", "replay", verb));
+    CHECK_FALSE(may(stranger, "Arm", "Arm.axes[1]", verb));
+  }
+  CHECK(rules.sees(viewer, replay));
+  CHECK(rules.sees(viewer, replay, "Arm"));
+  CHECK_FALSE(rules.sees(viewer, replay, "replay"));
+  CHECK(rules.sees(operators, replay, "replay"));
+  CHECK_FALSE(rules.sees(stranger, replay));
+  CHECK_FALSE(rules.check(stranger, {.device = replay}));
+  CHECK(rules.extent(viewer, replay, Verb::read) == Extent::some);
+  CHECK(rules.extent(stranger, replay, Verb::read) == Extent::none);
+
+  auto agent = operators;
+  agent.face = Face::mcp;
+  const AccessRequest seek{
+      .device = replay, .service = "replay", .path = "replay", .member = "seek", .verb = Verb::call};
+  CHECK_FALSE(rules.terms(agent, seek));
+  CHECK_FALSE(rules.check(agent, seek));
+
+  AccessRule all;
+  all.roles = {"viewer"};
+  all.devices = {"lab.arm"};
+  all.may.assign(std::begin(device_verbs), std::end(device_verbs));
+  CHECK(AccessRules({all}, true).extent(viewer, "lab.arm", Verb::call) == Extent::all);
+  CHECK(AccessRules({all}, true).extent(viewer, replay, Verb::call) == Extent::some);
+  all.may.push_back(Verb::record);
+  CHECK(AccessRules({all}, true).extent(viewer, replay, Verb::call) == Extent::all);
+}
+
+TEST_CASE("the name of a device that plays a recording says what was recorded") {
+  const auto name = replay_name("lab.arm.Arm.20261125T083000123Z-2");
+  const auto played = played_by(name);
+  REQUIRE(played);
+  CHECK(played->device == "lab.arm");
+  CHECK(played->service == "Arm");
+  CHECK_FALSE(played_by("lab.arm.Arm.20261125T083000123Z"));
+  CHECK(played_by("replay~x")->service.empty());
 }

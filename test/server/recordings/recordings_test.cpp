@@ -20,7 +20,7 @@ struct RecordedArm {
   Config config = configured();
   DeviceRegistry devices{io.get_executor(), config};
   ValueClients clients{io.get_executor(), MemoryBudget(1'000'000).charge("")};
-  Recordings recordings{io.get_executor(), config, devices, clients, workers};
+  Recordings recordings{io.get_executor(), config, devices, clients, workers, MemoryBudget(1'000'000).charge("")};
   Workers workers;
 
   ~RecordedArm() {

@@ -1,0 +1,179 @@
+// Recordings that are played as devices: which there are, how many, and what ends them.
+#include "server/recordings/replays.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "core/session/service/service_index.hpp"
+#include "server/json/schema.hpp"
+#include "server/record/recording_writer.hpp"
+#include "server/recordings/recording_files.hpp"
+#include "test/support/folder.hpp"
+#include "test/support/print.hpp"
+
+using namespace rrgate;
+
+namespace {
+
+constexpr const char* definition = R"(service com.x
+stdver 0.10
+object Robot
+    wire int32 count [readonly]
+end
+)";
+
+/// Ten seconds of a wire.
+void write_recording(const std::string& path) {
+  rr::TypeRegistry types;
+  REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+  RecordedService service;
+  service.label = service.service = "Robot";
+  service.url = "rr+tcp://h:1/?service=Robot";
+  service.type = "com.x.Robot";
+  service.node.name = "my.robot";
+  service.definitions = {definition};
+  service.objects = {{"Robot", "com.x.Robot"}};
+  auto writer = RecordingWriter::create(path).value();
+  REQUIRE(writer.add_service(service));
+  const auto& count = *types.find_entity("com.x.Robot")->find_member("count");
+  const auto channel = writer.add_member(service, "Robot", "", count, rr::named_type_schemas(types)).value();
+  for (int i = 0; i <= 10; ++i) REQUIRE(writer.write(channel, {{"value", i}}, rr::TimeSpec{100 + i, 0}, {100 + i, 0}));
+  REQUIRE(writer.close());
+}
+
+struct Played {
+  boost::asio::io_context io{1};
+  test::Folder folder;
+  Config config = {};
+  DeviceRegistry devices{io.get_executor(), config};
+  std::unique_ptr<Replays> replays;
+
+  explicit Played(std::size_t memory = 10'000'000)
+      : replays(std::make_unique<Replays>(io.get_executor(), devices, MemoryBudget(memory).charge(""))) {}
+  ~Played() {
+    if (replays) replays->stop();
+    devices.stop();
+    io.restart();
+    io.run_for(std::chrono::milliseconds(50));
+  }
+  std::string write(int number) {
+    const auto file = "arm.Robot.2026112" + std::to_string(number) + "T083000123Z.mcap";
+    write_recording(folder.path(file));
+    return file;
+  }
+  /// What becomes of it; nullopt: nothing yet.
+  std::shared_ptr<std::optional<rr::Result<>>> begin(const std::string& file) {
+    auto out = std::make_shared<std::optional<rr::Result<>>>();
+    boost::asio::co_spawn(io, replays->play(folder.path(""), file),
+                          [out](const std::exception_ptr&, const rr::Result<>& result) { *out = result; });
+    return out;
+  }
+  bool until(const std::function<bool()>& is_so) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!is_so() && std::chrono::steady_clock::now() < end) {
+      io.restart();
+      io.run_one_for(std::chrono::milliseconds(20));
+    }
+    return is_so();
+  }
+  rr::Result<> play(const std::string& file) {
+    const auto outcome = begin(file);
+    REQUIRE(until([&] { return outcome->has_value(); }));
+    return **outcome;
+  }
+  bool has_gone(const std::string& name) {
+    return until([&] { return !replays->is_playing(name) && !devices.find(name); });
+  }
+};
+
+}  // namespace
+
+TEST_CASE("replays: a file is a shared device of the recorded service and of one that controls it, until it is ended") {
+  Played made;
+  const auto file = made.write(1);
+  REQUIRE(made.play(file));
+  const auto name = replay_of_file(file);
+  CHECK(name == "replay~arm.Robot.20261121T083000123Z");
+  CHECK(recording_of_replay(name) == "arm.Robot.20261121T083000123Z");
+  const auto* device = made.devices.find(name);
+  REQUIRE(device);
+  CHECK(device->is_shared());
+  REQUIRE(made.until([&] { return device->state() == DeviceState::online; }));
+  std::set<std::string> services;
+  for (const auto& service : device->identity()->services) services.insert(service.name);
+  services.erase(std::string(rr::service_index_name));
+  CHECK(services == std::set<std::string>{"Robot", "replay"});
+  CHECK(made.play(file));  // goes on
+  CHECK(made.devices.find(name) == device);
+  CHECK(made.replays->list() == std::vector<std::string>{name});
+  made.replays->end(name);
+  CHECK_FALSE(made.devices.find(name));
+  REQUIRE(made.play(file));  // anew
+  CHECK(made.devices.find(name));
+}
+
+TEST_CASE("replays: there are four at a time, and who has ended one begins another at once") {
+  Played made;
+  for (int i = 1; i <= 4; ++i) REQUIRE(made.play(made.write(i)));
+  const auto fifth = made.write(5);
+  const auto refused = made.play(fifth);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == rr::ErrorCode::invalid_state);
+  CHECK(refused.error().message == "as many recordings are played as may be (4)");
+  made.replays->end(made.replays->list().front());
+  CHECK(made.play(fifth));
+}
+
+TEST_CASE("replays: one whose file has gone, or whose folder is none any more, ends") {
+  Played made;
+  const auto file = made.write(1);
+  const auto other = made.write(2);
+  REQUIRE(made.play(file));
+  REQUIRE(made.play(other));
+  std::filesystem::remove(made.folder.path(file));
+  CHECK(made.has_gone(replay_of_file(file)));
+  made.replays->keep_folder(made.folder.path(""));
+  CHECK(made.replays->is_playing(replay_of_file(other)));
+  made.replays->keep_folder("/elsewhere");
+  CHECK(made.has_gone(replay_of_file(other)));
+}
+
+TEST_CASE("replays: a file that can't be played says why, and is no device") {
+  Played made;
+  const std::string damaged = "arm.Robot.20261121T083000123Z.mcap";
+  made.folder.write(damaged, "no MCAP");
+  const auto refused = made.play(damaged);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == rr::ErrorCode::data_serialization_error);
+  CHECK(refused.error().message.find("is no MCAP file") != std::string::npos);
+  const auto missing = made.play("arm.Robot.20261122T083000123Z.mcap");
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().message.find("No such file") != std::string::npos);
+  CHECK(made.devices.all().empty());
+  CHECK(made.replays->list().empty());
+}
+
+TEST_CASE("replays: one that takes more memory than is left is refused") {
+  Played made(100);
+  const auto refused = made.play(made.write(1));
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
+  CHECK(made.devices.all().empty());
+}
+
+TEST_CASE("replays: who waits for one to begin hears of its end, and of that of the gateway") {
+  Played made;
+  const auto file = made.write(1);
+  const auto outcome = made.begin(file);
+  REQUIRE(made.until([&] { return made.replays->is_playing(replay_of_file(file)); }));
+  made.replays->stop();
+  REQUIRE(made.until([&] { return outcome->has_value(); }));
+  const auto late = made.play(file);
+  REQUIRE_FALSE(late);
+  CHECK(late.error().code == rr::ErrorCode::operation_cancelled);
+  SECTION("and goes while its threads run") {
+    made.replays.reset();
+  }
+}
