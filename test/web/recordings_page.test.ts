@@ -40,3 +40,51 @@ test("a recording is not deleted by a second click where the first one was", asy
   await press("Delete it for good");
   expect(desk.remove).toHaveBeenCalledWith(recording);
 });
+
+test("a recording is played, shown and ended, unless four are played already", async () => {
+  const files = [1, 2, 3, 4, 5].map((part) => ({ name: `r${part}.mcap`, bytes: 1, replay: "" }));
+  const state = (playing: number) => ({
+    enabled: true,
+    bytes: 10,
+    maxBytes: 100,
+    list: [
+      { ...recording, files: files.map((file, i) => (i < playing ? { ...file, replay: `replay~r${i + 1}` } : file)) },
+    ],
+  });
+  const desk = {
+    state: new Store(state(3)),
+    trouble: new Store(null),
+    start: () => undefined,
+    stop: () => undefined,
+    play: vi.fn(() => Promise.resolve()),
+    endPlaying: vi.fn(() => Promise.resolve()),
+  };
+  show(RecordingsPage, { desk, list: { state: new Store({ kind: "loading" }) } } as never);
+  await settle();
+  await press("Play part 5");
+  expect(desk.play).toHaveBeenCalledWith(files[4]);
+  const link = [...document.querySelectorAll("a")].find((each) => each.textContent === "Show part 1");
+  expect(link?.getAttribute("href")).toBe("#/devices/replay~r1/robot");
+  await press("Stop playing part 1");
+  expect(desk.endPlaying).toHaveBeenCalledWith({ ...files[0], replay: "replay~r1" });
+  desk.state.value = state(4);
+  await settle();
+  expect(button("Play part 5").disabled).toBe(true);
+  expect(button("Play part 5").title).toBe("4 recordings are played already; stop one of them first");
+});
+
+test("a replay is not offered for recording", async () => {
+  const devices = ["arm", "replay~arm.robot.20261125T083000123Z"].map((name) => ({
+    name,
+    services: [{ name: "robot", type: "" }],
+  }));
+  const desk = {
+    state: new Store({ enabled: true, bytes: 10, maxBytes: 100, list: [] }),
+    trouble: new Store(null),
+    start: () => undefined,
+    stop: () => undefined,
+  };
+  show(RecordingsPage, { desk, list: { state: new Store({ kind: "known", devices }) } } as never);
+  await settle();
+  expect([...document.querySelectorAll("option")].map((each) => each.value)).toEqual(["arm/robot"]);
+});

@@ -131,6 +131,11 @@ function stateOf(state: unknown): DeviceState {
   return state === "online" || state === "connecting" ? state : "offline";
 }
 
+/** Whether a device plays a recording of the gateway's: no other has such a name. */
+export function isReplay(device: string): boolean {
+  return device.startsWith("replay~");
+}
+
 /** Where a service of a device is reached through the gateway that served this page. */
 export function relayUrl(device: string, service: string, base?: string): string {
   return socketUrl(`devices/${encodeURIComponent(device)}`, service, base);

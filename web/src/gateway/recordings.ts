@@ -1,4 +1,4 @@
-// Recordings that the gateway makes of its devices: which there are, and beginning, stopping and deleting them.
+// Recordings that the gateway makes of its devices: which there are, and beginning, stopping, playing and deleting them.
 // Layer: web/gateway. Source: /api/v1/recordings. An older gateway answers 404.
 
 import { Store } from "../app/store";
@@ -10,6 +10,8 @@ import type { Session } from "./session";
 export interface RecordingFile {
   name: string;
   bytes: number;
+  /** The device that plays it; "": none. */
+  replay: string;
 }
 
 export interface Recording {
@@ -35,6 +37,9 @@ export interface Recordings {
   maxBytes: number;
   list: readonly Recording[];
 }
+
+/** That the gateway plays at a time. */
+export const MOST_REPLAYS = 4;
 
 const PATH = "api/v1/recordings";
 const POLL_MS = 2_000;
@@ -95,6 +100,14 @@ export class RecordingDesk {
     return this.#send(`${PATH}/${encodeURIComponent(recording.name)}`, "DELETE");
   }
 
+  play(file: RecordingFile): Promise<void> {
+    return this.#send(`${fileAddress(file)}/play`, "POST", {});
+  }
+
+  endPlaying(file: RecordingFile): Promise<void> {
+    return this.#send(`${fileAddress(file)}/play`, "DELETE");
+  }
+
   async #ask(signal: AbortSignal): Promise<Recordings> {
     const response = await this.#session.fetch(PATH, { signal });
     if (response.status === 404) return readRecordings({});
@@ -134,7 +147,11 @@ export function readRecordings(answer: unknown): Recordings {
       beginMs: number(each["begin"]) * 1000,
       seconds: number(each["seconds"]),
       bytes: number(each["bytes"]),
-      files: list(each["files"]).map((file) => ({ name: text(file["name"]), bytes: number(file["bytes"]) })),
+      files: list(each["files"]).map((file) => ({
+        name: text(file["name"]),
+        bytes: number(file["bytes"]),
+        replay: text(file["replay"]),
+      })),
     })),
   };
 }

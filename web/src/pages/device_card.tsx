@@ -6,6 +6,7 @@ import { formatRoute } from "../app/router";
 import type { Device, DeviceMode, Service } from "../gateway/devices";
 import { isUsb } from "../gateway/usb_devices";
 import { ClassIcon } from "../ui/class_icon";
+import { RecordingMark } from "../ui/recording_mark";
 import { StateBadge } from "../ui/state_badge";
 import { sentence } from "../ui/words";
 import { SubscriptionsPart } from "./subscriptions_part";
@@ -27,6 +28,7 @@ export function DeviceCard({ device, stale }: { device: Device; stale: boolean }
             USB
           </span>
         )}
+        <RecordingMark device={device.name} />
         <StateBadge state={device.state} text={stale ? t("was {0}", t(device.state)) : t(device.state)} />
       </div>
       {device.state !== "online" && (

@@ -1,13 +1,14 @@
-// The recordings that the gateway makes: beginning, stopping, getting and deleting them.
+// The recordings that the gateway makes: beginning, stopping, getting, playing and deleting them.
 // Layer: web/pages.
 
 import { useEffect, useState } from "preact/hooks";
 import { language, t } from "../app/language";
+import { formatRoute } from "../app/router";
 import { useStore } from "../app/store";
-import { devicesOf } from "../gateway/devices";
+import { devicesOf, isReplay } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { fileAddress, isUnderWay, RecordingDesk } from "../gateway/recordings";
-import type { Recording } from "../gateway/recordings";
+import { fileAddress, isUnderWay, MOST_REPLAYS, RecordingDesk } from "../gateway/recordings";
+import type { Recording, RecordingFile } from "../gateway/recordings";
 import { session } from "../gateway/session";
 import { isUsb } from "../gateway/usb_devices";
 import { Failure } from "../ui/failure";
@@ -27,6 +28,8 @@ export default function Recordings({ list }: RecordingsProps) {
 export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
   const state = useStore(desk.state);
   const trouble = useStore(desk.trouble);
+  const playing = state?.list.flatMap(({ files }) => files).filter(({ replay }) => replay !== "").length ?? 0;
+  const mayPlay = playing < MOST_REPLAYS;
   useEffect(() => {
     desk.start();
     return () => desk.stop();
@@ -52,7 +55,7 @@ export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: Devi
           {state.list.length === 0 && <p class="empty">{t("There are no recordings yet.")}</p>}
           <ul class="devices">
             {state.list.map((each) => (
-              <RecordingRow key={each.name} recording={each} desk={desk} />
+              <RecordingRow key={each.name} recording={each} desk={desk} mayPlay={mayPlay} />
             ))}
           </ul>
         </>
@@ -67,7 +70,7 @@ const EXAMPLE = `"recordings": { "folder": "/var/lib/rrgate/recordings" }`;
 function BeginForm({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
   const devices = devicesOf(useStore(list.state)) ?? [];
   const choices = devices
-    .filter(({ name }) => !isUsb(name))
+    .filter(({ name }) => !isUsb(name) && !isReplay(name))
     .flatMap(({ name, services }) => services.map((service) => ({ device: name, service: service.name })));
   const [chosen, setChosen] = useState("");
   const choice = choices.find((each) => keyOf(each) === chosen) ?? choices[0];
@@ -112,7 +115,14 @@ const STATES: Readonly<Record<string, string>> = {
   failed: "has failed",
 };
 
-function RecordingRow({ recording, desk }: { recording: Recording; desk: RecordingDesk }) {
+interface RecordingRowProps {
+  recording: Recording;
+  desk: RecordingDesk;
+  /** Not as many are played as may be. */
+  mayPlay: boolean;
+}
+
+function RecordingRow({ recording, desk, mayPlay }: RecordingRowProps) {
   const { name, device, service, state, standing, problem, beginMs, seconds, bytes, files } = recording;
   const [asks, setAsks] = useState(false);
   return (
@@ -134,6 +144,16 @@ function RecordingRow({ recording, desk }: { recording: Recording; desk: Recordi
           <a key={file.name} class="button" href={fileAddress(file)} download={file.name}>
             {files.length === 1 ? t("Download") : t("Download part {0}", index + 1)}
           </a>
+        ))}
+        {files.map((file, index) => (
+          <PlayButtons
+            key={file.name}
+            file={file}
+            part={files.length === 1 ? null : index + 1}
+            service={service}
+            desk={desk}
+            mayPlay={mayPlay}
+          />
         ))}
         {isUnderWay(recording) && !standing && (
           <button class="button" type="button" onClick={() => void desk.end(recording)}>
@@ -160,6 +180,40 @@ function RecordingRow({ recording, desk }: { recording: Recording; desk: Recordi
         )}
       </div>
     </li>
+  );
+}
+
+interface PlayButtonsProps {
+  file: RecordingFile;
+  /** null: there is one only. */
+  part: number | null;
+  service: string;
+  desk: RecordingDesk;
+  mayPlay: boolean;
+}
+
+function PlayButtons({ file, part, service, desk, mayPlay }: PlayButtonsProps) {
+  if (file.replay === "")
+    return (
+      <button
+        class="button"
+        type="button"
+        disabled={!mayPlay}
+        title={mayPlay ? undefined : t("{0} recordings are played already; stop one of them first", MOST_REPLAYS)}
+        onClick={() => void desk.play(file)}
+      >
+        {part === null ? t("Play") : t("Play part {0}", part)}
+      </button>
+    );
+  return (
+    <>
+      <a class="button" href={formatRoute(file.replay, service)}>
+        {part === null ? t("Show the recording") : t("Show part {0}", part)}
+      </a>
+      <button class="button" type="button" onClick={() => void desk.endPlaying(file)}>
+        {part === null ? t("Stop playing") : t("Stop playing part {0}", part)}
+      </button>
+    </>
   );
 }
 

@@ -22,6 +22,7 @@ import { isCreate, isNamedCreate } from "../robot/is_create";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { loaded } from "../ui/loaded";
+import { RecordingMark } from "../ui/recording_mark";
 import type { MembersPageProps } from "./members_page";
 import { ReplayBar } from "./replay_bar";
 import type { RobotPageProps } from "./robot_page";
@@ -53,9 +54,12 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   return (
     <div class={`page ${width}`}>
       <div class="service-head">
-        <h1 class="place-name" title={device}>
-          {device}
-        </h1>
+        <div>
+          <h1 class="place-name" title={device}>
+            {device}
+          </h1>
+          <RecordingMark device={device} />
+        </div>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {link && !onlyStop && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
