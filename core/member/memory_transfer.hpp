@@ -48,7 +48,8 @@ class MemoryCollector {
 
 /// What a client session keeps of a transfer between two requests.
 struct MemoryTransfer {
-  enum class Stage : std::uint8_t { dimensions, limit, data };
+  /// What the next reply is about; replaced: the object is another one now, and that reply is the last.
+  enum class Stage : std::uint8_t { dimensions, limit, data, replaced };
 
   bool is_write = false;
   Stage stage = Stage::dimensions;

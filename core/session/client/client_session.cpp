@@ -103,7 +103,6 @@ void ClientSession::scan_deadlines(Now now) {
     else
       earliest_deadline_ = std::min(earliest_deadline_, pending.deadline);
   }
-  rr::sort(expired);
   for (const auto id : expired) {
     const auto found = pending_.find(id);
     if (found == pending_.end()) continue;
@@ -141,6 +140,10 @@ Result<const MemberDefinition*> ClientSession::find_member(std::string_view path
                                                        std::string(member_kind_name(definition->kind)) + ", not a " +
                                                        std::string(member_kind_name(kind)));
   return definition;
+}
+
+Error ClientSession::object_replaced(std::string_view path) {
+  return make_error(ErrorCode::object_not_found, "object " + quote(path) + " was replaced");
 }
 
 Error ClientSession::not_connected() const {
@@ -395,9 +398,12 @@ void ClientSession::handle_path_released(std::string_view path) {
   if (path == options_.service) return;  // the root cannot be released
   std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); });
   std::erase_if(memory_limits_, [path](const auto& memory) { return is_within(memory.first.path, path); });
-  for (auto& [id, pending] : pending_)
+  for (auto& [id, pending] : pending_) {
     if (pending.fetch && is_within(pending.fetch->path, path))
       pending.fetch->object_type.clear();  // what is there now may be of another type
+    if (pending.memory && is_within(pending.memory->path, path))
+      pending.memory->stage = MemoryTransfer::Stage::replaced;  // further parts would be those of another object
+  }
   release_wires(path);
   release_pipes(path);
   emit(PathReleased{std::string(path)});

@@ -161,8 +161,9 @@ class ClientSession {
   /// Completes with a uint64 array: the dimensions of a memory, for a plain array its length.
   RequestId get_memory_dimensions(std::string_view path, std::string_view member, Now now);
   /// Completes with the items: Array, MultiDimArray, PodArray or NamedArray. Position and count have one number a
-  /// dimension; out_of_range where they are not within the memory. Split into requests below the transfer limit, each
-  /// with the time of a request: what others write meanwhile may be in some parts and not in others.
+  /// dimension; out_of_range where they are not within the memory; object_not_found where the object is replaced before
+  /// all have come. Split into requests below the transfer limit, each with the time of a request: what others write
+  /// meanwhile may be in some parts and not in others.
   RequestId read_memory(std::string_view path, std::string_view member, std::span<const std::uint64_t> position,
                         std::span<const std::uint64_t> count, Now now);
   /// Writes all of `value`, split as read_memory(); completes with null. An error may leave a part written.
@@ -360,6 +361,7 @@ class ClientSession {
   template <class AddElements>
   RequestId request_session_op(std::string_view path, std::string_view command, Now now, AddElements&& add_elements);
   Error not_connected() const;
+  static Error object_replaced(std::string_view path);
   void handle_session_op_reply(const Message& message, const MessageEntry& entry, RequestId id, std::string path,
                                Now now);
 

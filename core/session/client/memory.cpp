@@ -134,6 +134,8 @@ Result<> ClientSession::take_memory_reply(const Message& message, const MessageE
       begin_memory_parts(member, transfer, *limit);
       return {};
     }
+    case MemoryTransfer::Stage::replaced:
+      return object_replaced(transfer.path);
     case MemoryTransfer::Stage::data:
       if (transfer.is_write) return {};
       auto data = read_memory_data(message, entry, transfer.part.count, member, types_);

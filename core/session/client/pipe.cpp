@@ -123,7 +123,7 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
       pipe->endpoints.try_emplace(*index, *pending.member, pipe_store_, PipeState::closing)
           .first->second.start_closing();
     request_silent_disconnect(pending.path, *pending.member, *index, now);
-    return make_error(ErrorCode::object_not_found, "object " + quote(pending.path) + " was replaced");
+    return object_replaced(pending.path);
   }
   // Replies may overtake one another: the index of an endpoint that is being closed may be free again already.
   if (const auto old = pipe->endpoints.find(*index);

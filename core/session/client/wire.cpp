@@ -164,7 +164,7 @@ void ClientSession::release_wires(std::string_view path) {
     if (!is_within(key.path, path)) continue;
     if (released->second.state == WireState::connecting) {
       const auto id = released->second.request_id;
-      Completed failed{id, make_error(ErrorCode::object_not_found, "object " + quote(key.path) + " was replaced")};
+      Completed failed{id, object_replaced(key.path)};
       cancel(id);  // with the wire
       emit(std::move(failed));
     } else {

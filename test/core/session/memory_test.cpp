@@ -332,3 +332,56 @@ TEST_CASE("a memory of an object that was replaced is asked for its limit again"
   script.next_client<PathReleased>();
   CHECK(read_notes() == 3);
 }
+
+TEST_CASE("a transfer whose object is replaced fails: what comes later is of another object") {
+  Script script;
+  REQUIRE(script.completion(script.client->find_object("arm.tool", script.now)).has_value());
+  const bool is_write = GENERATE(false, true);
+  const std::uint64_t position[] = {0}, count[] = {30'000};
+  const auto transfer = [&](const char* path, const char* member) {
+    return is_write ? script.client->write_memory(path, member, position, numbers(30'000), script.now)
+                    : script.client->read_memory(path, member, position, count, script.now);
+  };
+  const auto part = [&](std::size_t items) {
+    if (is_write)
+      script.expect(CallKind::memory_write, Value{});
+    else
+      script.expect(CallKind::memory_read, numbers(items));
+  };
+  const auto release = [&](std::string_view path) {
+    script.service->release_path(path, script.now);
+    script.pump();
+    CHECK(script.next_client<PathReleased>().path == path);
+  };
+  SECTION("between two parts") {
+    const auto id = transfer("arm.tool", "notes");
+    script.expect(CallKind::memory_dimensions, shape({30'000}));
+    part(12'800);
+    release("arm.tool");
+    part(12'800);  // was asked for before the client heard
+    const auto error = script.error_of(id);
+    CHECK(error.code == ErrorCode::object_not_found);
+    CHECK(error.message == "object 'arm.tool' was replaced");
+  }
+  SECTION("before the first part") {
+    REQUIRE(script.completion(script.client->find_object("arm.tools[a]", script.now)).has_value());
+    const auto id = transfer("arm.tools[a]", "notes");
+    script.pump();
+    release("arm.tools[a]");
+    script.expect(CallKind::memory_dimensions, shape({30'000}));
+    CHECK(script.error_of(id).code == ErrorCode::object_not_found);
+  }
+  SECTION("that of another object goes on") {
+    const auto id = transfer("arm", "data");
+    script.expect(CallKind::memory_dimensions, shape({30'000}));
+    part(12'800);
+    release("arm.tool");
+    part(12'800);
+    part(4'400);
+    CHECK(script.completion(id).has_value());
+  }
+  script.pump();
+  CHECK_FALSE(script.service->poll_event());
+  CHECK_FALSE(script.client->poll_event());
+  CHECK(script.client->pending_requests() == 0);
+}
