@@ -20,9 +20,12 @@ function setup(answer: () => Promise<unknown> = () => Promise.resolve()) {
   };
   const lease = vi.fn(async () => (await answer(), held));
   const locks = new OwnLocks();
-  const object = { lease, locks, path: "Create.arm" } as never;
+  const controls = new Map<string, Control>();
+  const object = { lease, locks, path: "Create.arm", controls } as never;
+  const control = new Control(object);
+  controls.set("Create.arm", control);
   return {
-    control: new Control(object),
+    control,
     object,
     lease,
     locks,
@@ -31,6 +34,8 @@ function setup(answer: () => Promise<unknown> = () => Promise.resolve()) {
     tell: (state: string, reason?: Error) => watchers.at(-1)?.(state, reason),
   };
 }
+
+afterEach(() => void vi.useRealTimers());
 
 describe("control", () => {
   it("is asked for once, however many commands wait for it", async () => {
@@ -112,6 +117,33 @@ describe("control", () => {
     expect(lease).toHaveBeenCalledWith({ takeover: true, timeout: 2_000 });
     expect(held.release).toHaveBeenCalledOnce();
     await expect(stopNow(object, true, () => Promise.reject(new Error("away")))).rejects.toThrow("away");
+  });
+  it("that needs no lease: a stop that somebody's lock keeps out has stopped nothing, and is sent again", async () => {
+    vi.useFakeTimers();
+    const { control, object } = setup(() => Promise.reject(failed("NotImplementedError", "none")));
+    let isLocked = false;
+    const sent: number[] = [];
+    const send = async (command: number): Promise<void> => {
+      const way = async (): Promise<void> => {
+        sent.push(command);
+        if (isLocked) throw failed("ObjectLockedError", "locked by vera");
+      };
+      await (command === 0 ? stopNow(object, false, way) : way());
+    };
+    const onError = vi.fn();
+    const driver = new Driver<number>({ rest: 0, same: Object.is, onError });
+    driver.setConnection({ send, right: control });
+    driver.want(5);
+    await vi.advanceTimersByTimeAsync(0);
+    isLocked = true;
+    await vi.advanceTimersByTimeAsync(1_300);
+    expect(sent).toEqual([5, 5, 0, 0, 0]);
+    expect(onError).toHaveBeenCalledTimes(4);
+    expect(driver.isMoving).toBe(true);
+    isLocked = false;
+    await vi.advanceTimersByTimeAsync(400);
+    expect(driver.isMoving).toBe(false);
+    driver.dispose();
   });
   it("is left alone by a stop that a lock of this page keeps out: that is given up, and the stop is sent again", async () => {
     const { object, lease, locks } = setup();

@@ -15,7 +15,7 @@ function makeDevice() {
   const urgent = vi.fn(() => Promise.resolve<unknown>(undefined));
   const setNow = vi.fn(() => Promise.resolve());
   const lease = () => Promise.reject(new Error("none"));
-  return { underWay, urgent, setNow, lease, locks: new OwnLocks(), path: "Create" };
+  return { underWay, urgent, setNow, lease, locks: new OwnLocks(), controls: new Map(), path: "Create" };
 }
 
 describe("a stop", () => {

@@ -146,11 +146,12 @@ export function controlOf(object: Remote): Control {
 /**
  * A stop that is refused because of a lock that this page had, and lost while the device was away, gives that up and is sent again.
  * A stop that is refused because somebody else has the lease: what this page commanded has been made safe by the gateway when
- * the lease went. Who `insists` takes it over, where one may, or takes it where nobody has it any more, so that the gateway makes
- * the device safe once more, and leaves it free. @throws (rejects) with what `stop` failed with.
+ * the lease went; where nobody gives leases, nothing has been made safe. Who `insists` takes it over, where one may, or takes it
+ * where nobody has it any more, so that the gateway makes the device safe once more, and leaves it free.
+ * @throws (rejects) with what `stop` failed with.
  */
 export async function stopNow(
-  object: Pick<Remote, "lease" | "locks" | "path">,
+  object: Pick<Remote, "lease" | "locks" | "path" | "controls">,
   insists: boolean,
   stop: () => Promise<unknown>,
 ): Promise<void> {
@@ -159,7 +160,10 @@ export async function stopNow(
   } catch (error) {
     if (!isLocked(error)) throw error;
     if (await object.locks.giveUp(object.path)) return stopNow(object, insists, stop);
-    if (!insists) return;
+    if (!insists) {
+      if (object.controls.get(object.path)?.state.value.kind === "free") throw error;
+      return;
+    }
     const timeout = 2_000;
     const lease = await object
       .lease({ takeover: true, timeout })

@@ -14,7 +14,7 @@ export interface StopCall {
 /** Of `com.robotraconteur.robotics.robot.Robot`. */
 export const ROBOT_STOP: StopCall = { call: "halt", args: [], set: { property: "command_mode", value: 0 } };
 
-type Device = Pick<Remote, "lease" | "locks" | "path" | "urgent" | "setNow" | "underWay">;
+type Device = Pick<Remote, "lease" | "locks" | "path" | "controls" | "urgent" | "setNow" | "underWay">;
 
 const TIMEOUT_MS = 2_000;
 const REPEAT_MS = 400;
