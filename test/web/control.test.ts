@@ -145,6 +145,22 @@ describe("control", () => {
     expect(driver.isMoving).toBe(false);
     driver.dispose();
   });
+  it.each(["PermissionDenied", "OutOfSystemResource", "RequestTimeout"] as const)(
+    "is given back where a stop failed with %s, so that the gateway makes the device safe",
+    async (code) => {
+      const { control, object, held, tell } = setup();
+      const fails = () => stopNow(object, false, () => Promise.reject(failed(code, "not now")));
+      await expect(fails()).rejects.toThrow("not now");
+      await control.begin();
+      tell("doubtful", failed("RequestTimeout", "no renewal was answered")); // the dead-man acts
+      await expect(fails()).rejects.toThrow("not now");
+      expect(held.release).not.toHaveBeenCalled();
+      tell("held");
+      await expect(fails()).rejects.toThrow("not now");
+      expect(held.release).toHaveBeenCalledOnce();
+      expect(control.mayCommand).toBe(false);
+    },
+  );
   it("is left alone by a stop that a lock of this page keeps out: that is given up, and the stop is sent again", async () => {
     const { object, lease, locks } = setup();
     const unlock = vi.fn(() => Promise.resolve());

@@ -62,8 +62,13 @@ export class Control {
     return () => {
       this.#users -= 1;
       this.#isLeft = this.#users === 0;
-      if (this.#isLeft && this.#lease) this.release().catch(() => undefined); // ends with its session, too
+      if (this.#isLeft) this.giveUp();
     };
+  }
+
+  /** What is held is given back, so that the gateway makes the device safe: no right and no rate refuses that. */
+  giveUp(): void {
+    if (this.#lease) this.release().catch(() => undefined); // ends with its session, too
   }
 
   /** The connection or the device is gone, and with it what was held. */
@@ -148,6 +153,8 @@ export function controlOf(object: Remote): Control {
  * A stop that is refused because somebody else has the lease: what this page commanded has been made safe by the gateway when
  * the lease went; where nobody gives leases, nothing has been made safe. Who `insists` takes it over, where one may, or takes it
  * where nobody has it any more, so that the gateway makes the device safe once more, and leaves it free.
+ * Where a stop fails otherwise, as for rights or rates, this page gives its lease back, and the gateway makes the device safe; where
+ * the gateway does not confirm the lease, it does so by itself.
  * @throws (rejects) with what `stop` failed with.
  */
 export async function stopNow(
@@ -158,10 +165,14 @@ export async function stopNow(
   try {
     await stop();
   } catch (error) {
-    if (!isLocked(error)) throw error;
+    const control = object.controls.get(object.path);
+    if (!isLocked(error)) {
+      if (control?.state.value.kind === "held") control.giveUp();
+      throw error;
+    }
     if (await object.locks.giveUp(object.path)) return stopNow(object, insists, stop);
     if (!insists) {
-      if (object.controls.get(object.path)?.state.value.kind === "free") throw error;
+      if (control?.state.value.kind === "free") throw error;
       return;
     }
     const timeout = 2_000;
