@@ -1,8 +1,12 @@
 // Stopping: past what waits, behind what it may have overtaken, and never said to have arrived where nothing was sent.
+import { clear, find, press, show } from "./shown";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
+import { StopButton } from "../../web/src/board/stop";
+import { session } from "../../web/src/gateway/session";
 import { onStop, tellStop, watchStop } from "../../web/src/robot/control";
 import { OwnLocks } from "../../web/src/robot/own_locks";
 import { remoteOf } from "../../web/src/robot/remote";
+import type { Remote } from "../../web/src/robot/remote";
 import { ROBOT_STOP, stopDevice } from "../../web/src/robot/stop";
 import { UnderWay } from "../../web/src/robot/under_way";
 import { HeldJog } from "../../web/src/panels/held_jog";
@@ -84,6 +88,44 @@ describe("a stop", () => {
     expect([isStopped(), watchStop()()]).toEqual([true, false]);
     expect(heard).toHaveBeenCalledOnce();
     forget();
+  });
+});
+
+describe("a stop over a connection that has broken unnoticed", () => {
+  beforeEach(() => void vi.useRealTimers());
+  afterEach(() => {
+    clear();
+    vi.restoreAllMocks();
+  });
+
+  /** What is fetched, and what is said in the end. */
+  async function pressStop(code: keyof typeof ErrorCode, safe: string[]) {
+    const device = makeDevice();
+    const error = Object.create(RobotRaconteurError.prototype) as RobotRaconteurError;
+    device.urgent.mockRejectedValue(Object.assign(error, { code: ErrorCode[code], message: "of the connection" }));
+    const fetched: string[] = [];
+    vi.spyOn(session, "fetch").mockImplementation((path) => {
+      fetched.push(path);
+      return Promise.resolve(Response.json({ lease: "key" }));
+    });
+    const place = { device: "robot", service: "Create" };
+    show(StopButton, { object: device as unknown as Remote, stop: { call: "halt", args: [] }, place, safe });
+    await press("Stop");
+    const words = find(".stop-words");
+    await vi.waitFor(() => expect(words.dataset.stop).not.toBe("sent"));
+    return [fetched.map((path) => /lease=(\w+)/.exec(path)?.[1]), words.dataset.stop, words.textContent];
+  }
+
+  it.each(["RequestTimeout", "ConnectionError"] as const)("is passed on by the gateway: %s", async (code) => {
+    const passed = [["take", "release"], "passed", expect.stringContaining("passed on by the gateway")];
+    expect(await pressStop(code, ["Create.Drive"])).toEqual(passed);
+  });
+
+  it("has failed where the gateway knows of nothing that is safe, or the device has answered", async () => {
+    const failed = [[], "failed", expect.stringContaining("NOT STOPPED: Error: of the connection")];
+    expect(await pressStop("RequestTimeout", [])).toEqual(failed);
+    clear();
+    expect(await pressStop("InvalidOperation", ["Create.Drive"])).toEqual(failed);
   });
 });
 

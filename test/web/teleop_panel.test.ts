@@ -1,5 +1,5 @@
 // Driving over an outage: what the device is told to rest by when it is back.
-import { clear, find, settle, show } from "./shown";
+import { clear, find, press, settle, show, text } from "./shown";
 import { memberOf } from "./members";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import type { PanelProps } from "../../web/src/panels/panel";
@@ -31,6 +31,29 @@ const robotOf = () => {
     urgent: vi.fn(never),
   };
 };
+
+test("a rest that somebody asked for is passed on by the gateway where the device does not answer it", async () => {
+  const robot = robotOf();
+  const error = Object.create(RobotRaconteurError.prototype) as RobotRaconteurError;
+  const silent = Object.assign(error, { code: ErrorCode.RequestTimeout });
+  robot.urgent.mockRejectedValue(silent);
+  const stopWithout = vi.fn(() => Promise.resolve("passed on"));
+  show(TeleopPanel, {
+    object: robot as unknown as Remote,
+    stopWithout,
+    members: moveOf("speed"),
+    definitions: new Definitions([]),
+    scope: "",
+    place: { device: "usb:d", service: "s", object: "" },
+    settings: { axes: [{ stick: "left-y", path: "speed", scale: 3, deadZone: 0 }] },
+    change: () => undefined,
+  } as unknown as PanelProps);
+  await settle();
+  await press("Rest");
+  expect(stopWithout).toHaveBeenCalledWith(silent);
+  expect(text()).toContain("passed on");
+  expect(robot.urgent).toHaveBeenCalledOnce();
+});
 
 test("each parameter rests at its own neutral value, wherever it stands by now", async () => {
   const [before, after] = [robotOf(), robotOf()];

@@ -131,7 +131,7 @@ export function PanelFrame({
             <Shown
               object={object}
               reach={reach}
-              stopWithout={() => stopWithout({ device, service }, safe)}
+              stopWithout={(cause) => stopWithout({ device, service }, safe, cause)}
               members={last.members}
               definitions={definitions}
               scope={scopeOf(last.type)}

@@ -10,7 +10,7 @@ import { isSignedOut, session } from "../gateway/session";
 import { isEscape, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { stopDevice } from "../robot/stop";
+import { passOn, stopDevice } from "../robot/stop";
 import type { StopCall } from "../robot/stop";
 import { useStore } from "../app/store";
 import { clockTime } from "../ui/words";
@@ -24,13 +24,13 @@ type State =
   | { kind: "failed"; why: string };
 
 /**
- * By a call where it is known how and there is a connection, else by what the gateway does when a lease ends; nothing where neither
- * is known.
+ * By a call where it is known how and there is a connection that answers, else by what the gateway does when a lease ends; nothing
+ * where neither is known.
  */
 export function StopButton({ object, stop, place, safe }: StopButtonProps) {
   if (!stop && safe.length === 0) return null;
   const send: Send = (failed) => {
-    if (stop && object) return stopDevice(object, stop, failed);
+    if (stop && object) return passOn(stopDevice(object, stop, failed), (cause) => stopWithout(place, safe, cause));
     tellStop();
     return stopWithout(place, safe);
   };
@@ -42,15 +42,17 @@ export function StopButton({ object, stop, place, safe }: StopButtonProps) {
 }
 
 /**
- * Without a connection to the device: by HTTP.
- * `safe`  what the gateway does to make it safe.
+ * Without a connection to the device that answers: by HTTP.
+ * `safe`   what the gateway does to make it safe.
+ * `cause`  why it was not stopped by the connection, where there is one.
  * @returns how it went, in words. @throws (rejects) why it may not have been stopped.
  */
 export async function stopWithout(
   { device, service }: StopButtonProps["place"],
   safe: readonly string[],
+  cause: unknown = new Error(withSignIn(t("not connected: nothing was sent"))),
 ): Promise<string> {
-  if (safe.length === 0) throw new Error(withSignIn(t("not connected: nothing was sent")));
+  if (safe.length === 0) throw cause;
   const at = performance.now();
   await makeSafe(device, service).catch((error: unknown) => {
     throw new Error(withSignIn(explain(error)), { cause: error });
@@ -103,7 +105,10 @@ export function StopPress({ send: stop, label, words, byEscape = false }: StopPr
     const at = performance.now();
     setState({ kind: "sent", at }); // each press sends again
     const fail = (error: unknown): void => setState({ kind: "failed", why: explain(error) });
-    stop(fail).then((how) => {
+    // What was passed on stands, whatever the connection does later.
+    const failLater = (error: unknown): void =>
+      setState((now) => (now.kind === "passed" ? now : { kind: "failed", why: explain(error) }));
+    stop(failLater).then((how) => {
       if (how !== undefined) setState({ kind: "passed", how });
       else setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() });
     }, fail);

@@ -1,7 +1,7 @@
 // The demo robot: chart, controls, live values, bump log, camera.
 // Layer: web/pages. What is known of the robot outlives its connections; see RobotModel.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { stopWithout, useSafe } from "../board/stop";
@@ -17,6 +17,7 @@ import type { Remote } from "../robot/remote";
 import { RobotModel } from "../robot/robot_model";
 import { sameCommand, STOP } from "../robot/steering";
 import type { DriveCommand } from "../robot/steering";
+import { passOn } from "../robot/stop";
 import { BumpLog } from "../robot_view/bump_log";
 import { DrivePanel } from "../robot_view/drive_panel";
 import { PoseLine } from "../robot_view/pose_line";
@@ -40,6 +41,10 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
   const remote = state.kind === "online" ? state.remote : null;
   const reach = openIn(state); // a stop also goes to a robot that is only said to be away
   const safe = useSafe({ device, service }, list);
+  const without = (cause?: unknown): Promise<string> => stopWithout({ device, service }, safe, cause);
+  // The view that is shown has a stop of its own.
+  const latest = useRef<typeof without | null>(null);
+  latest.current = shown ? without : null;
   const model = useMemo(() => new RobotModel(), []);
   const [driveFailure, setDriveFailure] = useState<string | null>(null);
   const { control, last, isOpen } = useControl(reach);
@@ -60,20 +65,22 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
     setDriveFailure(null);
     const send = async (command: DriveCommand, insists: boolean): Promise<void> => {
       const given = [command.velocity, command.radius];
-      if (!sameCommand(command, STOP)) await reach.call("Drive", given, { timeout: DRIVE_TIMEOUT_MS });
-      else await stopNow(reach, insists, () => reach.urgent("Drive", given, { timeout: DRIVE_TIMEOUT_MS }));
-      setDriveFailure(null);
+      if (!sameCommand(command, STOP)) {
+        await reach.call("Drive", given, { timeout: DRIVE_TIMEOUT_MS });
+        return setDriveFailure(null);
+      }
+      const stop = stopNow(reach, insists, () => reach.urgent("Drive", given, { timeout: DRIVE_TIMEOUT_MS }));
+      const passed = insists && latest.current ? passOn(stop, latest.current) : stop;
+      setDriveFailure((await passed) ?? null);
     };
     driver.setConnection({ send, right: control });
     return () => driver.dispose();
   }, [reach, control, driver]);
 
   const stopUnconnected = (): void => {
-    if (!shown) return; // the view that is shown has a stop of its own
+    if (!shown) return;
     setDriveFailure(t("sent, no answer yet"));
-    stopWithout({ device, service }, safe).then(setDriveFailure, (error: unknown) =>
-      setDriveFailure(t("NOT STOPPED: {0}", explain(error))),
-    );
+    without().then(setDriveFailure, (error: unknown) => setDriveFailure(t("NOT STOPPED: {0}", explain(error))));
   };
 
   const live = remote !== null;

@@ -14,10 +14,11 @@ export interface PanelProps {
   /** The same for a stop: also while the device is only said to be away. */
   reach: Remote | null;
   /**
-   * A stop where `reach` is null, by what the gateway does to make the device safe.
+   * A stop where `reach` is null or nothing comes back over it, by what the gateway does to make the device safe.
+   * `cause`: what came of the stop by `reach`.
    * @returns how it went, in words. @throws (rejects) why it may not have arrived.
    */
-  stopWithout: () => Promise<string>;
+  stopWithout: (cause?: unknown) => Promise<string>;
   /** What was last known of it, also without connection. */
   members: readonly Member[];
   definitions: Definitions;

@@ -7,7 +7,7 @@ import { isFresh, useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
 import { stopNow, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
-import { ROBOT_STOP, stopDevice } from "../robot/stop";
+import { passOn, ROBOT_STOP, stopDevice } from "../robot/stop";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
@@ -51,7 +51,7 @@ export default function RobotPanel(props: PanelProps) {
     setHalted(null);
     if (reach) {
       const fail = (error: unknown): void => setFailure(explain(error));
-      return void stopDevice(reach, ROBOT_STOP, fail).catch(fail);
+      return void passOn(stopDevice(reach, ROBOT_STOP, fail), stopWithout).then((how) => setHalted(how ?? null), fail);
     }
     tellStop();
     setHalted(t("sent, no answer yet"));
@@ -122,7 +122,7 @@ export default function RobotPanel(props: PanelProps) {
         </label>
       </div>
       <ControlLine control={last} isThere={object !== null} place={place} />
-      <p class="note" role="status" hidden={halted === null || reach !== null}>
+      <p class="note" role="status" hidden={halted === null}>
         {halted}
       </p>
       <Failure text={failure ?? acting.failure ?? unknown} />

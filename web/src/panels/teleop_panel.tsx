@@ -7,6 +7,7 @@ import { stopNow } from "../robot/control";
 import { Driver } from "../robot/driver";
 import { onLetGo } from "../robot/let_go";
 import { explain } from "../robot/remote";
+import { passOn } from "../robot/stop";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { jsonOf } from "../values/draft";
@@ -39,7 +40,7 @@ import "./teleop_panel.css";
 const REPEAT_MS = 100;
 
 export default function TeleopPanel(props: PanelProps) {
-  const { object, members, definitions, scope, place, settings, change } = props;
+  const { object, stopWithout, members, definitions, scope, place, settings, change } = props;
   const choices = membersFor("teleop", members);
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
@@ -63,8 +64,8 @@ export default function TeleopPanel(props: PanelProps) {
     [],
   );
   const commands = useMemo(() => new Commands(), [name]); // also over a connection that is made anew
-  const latest = useRef({ member, mapping, definitions, scope });
-  latest.current = { member, mapping, definitions, scope };
+  const latest = useRef({ member, mapping, definitions, scope, stopWithout });
+  latest.current = { member, mapping, definitions, scope, stopWithout };
   useEffect(() => {
     if (!object || !control || !member) return;
     let by = latest.current;
@@ -73,8 +74,12 @@ export default function TeleopPanel(props: PanelProps) {
       const given = commands.of(by.mapping, inputsOf(member), deflection, by.definitions, by.scope);
       const isRest = deflection === AT_REST;
       const way = (): Promise<unknown> => tell(object, member, given, isRest);
-      await (isRest ? stopNow(object, insists, way) : way());
-      setFailure(null);
+      if (!isRest) {
+        await way();
+        return setFailure(null);
+      }
+      const stop = stopNow(object, insists, way);
+      setFailure((await (insists ? passOn(stop, latest.current.stopWithout) : stop)) ?? null);
     };
     driver.setConnection({ send, right: control });
     return () => driver.dispose();

@@ -132,6 +132,10 @@ const doubt = (reason: unknown): string => t("You may not be in control any more
 /** Whether a command was refused because its sender does not have the right to command, or another has it. */
 export const isLocked = (error: unknown): boolean => codeOf(error) === ErrorCode.ObjectLockedError;
 
+/** Whether nothing came back from the device: by a connection that broke unnoticed, or to a gateway that has none to it. */
+export const isUnanswered = (error: unknown): boolean =>
+  codeOf(error) === ErrorCode.RequestTimeout || codeOf(error) === ErrorCode.ConnectionError;
+
 function codeOf(error: unknown): number | undefined {
   return error instanceof RobotRaconteurError ? error.code : undefined;
 }

@@ -1,7 +1,7 @@
 // Stops a device at once, past whatever waits, and once more behind the commands that the stop may have overtaken.
 // Layer: web/robot.
 
-import { stopNow, tellStop } from "./control";
+import { isUnanswered, stopNow, tellStop } from "./control";
 import type { Remote } from "./remote";
 
 /** What stops the device: a function with its arguments, and a property to set as well: some drivers have only one of them. */
@@ -32,6 +32,14 @@ export async function stopDevice(device: Device, stop: StopCall, failed: (error:
   const first = send(device, stop, true);
   if (overtaken) sendBehind(device, stop, overtaken, first).catch(failed);
   return first;
+}
+
+/**
+ * `stop` by the connection; where nothing comes back over that, `without`, which hears why.
+ * @returns how `without` went, in words.
+ */
+export function passOn(stop: Promise<void>, without: (cause: unknown) => Promise<string>): Promise<string | void> {
+  return stop.catch((error: unknown) => (isUnanswered(error) ? without(error) : Promise.reject(error)));
 }
 
 /** Nothing is waited for: a call that hangs does not hold this one up. */
