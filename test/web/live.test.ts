@@ -32,6 +32,13 @@ describe("a pulse", () => {
     expect(pulse.look(20_500, 0, false)).toBe(0);
   });
 
+  it("takes what a gateway says that has no connection to the device for no answer", async () => {
+    const pulse = new Pulse(() => Promise.reject(failed("ConnectionError")));
+    pulse.look(0, 0, true);
+    await settle();
+    expect(pulse.look(1_000, 0, true)).toBe(1_000);
+  });
+
   it("that is answered is told of, whatever no longer comes, unless a gateway may have answered", async () => {
     const pulse = new Pulse(() => Promise.resolve(true));
     pulse.look(0, 0, false);

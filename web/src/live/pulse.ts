@@ -1,8 +1,8 @@
 // Whether the device still answers: asked twice a second while somebody looks, so that a frozen one is seen within a second.
 // Layer: web/live.
 
-import { ErrorCode, RobotRaconteurError } from "rrgate-client";
 import { useEffect, useState } from "preact/hooks";
+import { isUnanswered } from "../robot/control";
 import type { Remote } from "../robot/remote";
 import { openFeeds } from "./feed";
 
@@ -19,7 +19,10 @@ export class Pulse {
   /** Whether the last answer was one to a question. */
   #hasAnswered = false;
 
-  /** `ask`: rejects with RequestTimeout without an answer; any other refusal is one. False: there is nothing to ask for. */
+  /**
+   * `ask`: rejects with RequestTimeout, or with ConnectionError of a gateway, without an answer; any other refusal is one. False: there
+   * is nothing to ask for.
+   */
   constructor(ask: (timeoutMs: number) => Promise<boolean>) {
     this.#ask = ask;
   }
@@ -46,7 +49,7 @@ export class Pulse {
       this.#hasAnswered = hasAnswered;
     };
     this.#ask(PATIENCE_MS).then(answered, (error: unknown) => {
-      if (!(error instanceof RobotRaconteurError && error.code === ErrorCode.RequestTimeout)) return answered(true);
+      if (!isUnanswered(error)) return answered(true);
       this.#isAsking = false;
       this.#hasAnswered = false;
     });
