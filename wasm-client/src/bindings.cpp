@@ -206,6 +206,3 @@ RR_EXPORT(definition) JsHandle rr_definition(JsHandle name) {
 RR_EXPORT(members) JsHandle rr_members(JsHandle path) {
   return session->members(JsValue(path)).release();
 }
-RR_EXPORT(child_path) JsHandle rr_child_path(JsHandle parent, JsHandle member, JsHandle index) {
-  return session->child_path(JsValue(parent), JsValue(member), JsValue(index)).release();
-}

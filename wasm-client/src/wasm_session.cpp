@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/session/service_path.hpp"
 #include "wasm-client/src/js_events.hpp"
 #include "wasm-client/src/object_info.hpp"
 #include "wasm-client/src/value_from_js.hpp"
@@ -396,11 +395,6 @@ JsValue WasmSession::definition(const JsValue& name) const {
 JsValue WasmSession::members(const JsValue& path) const {
   const auto* type = session_.object_type(text_of(path));
   return type ? make_js_members(*type) : JsValue::undefined();
-}
-
-JsValue WasmSession::child_path(const JsValue& parent, const JsValue& member, const JsValue& index) const {
-  if (index.kind() != JsKind::text) return make_js_text(rr::child_path(text_of(parent), text_of(member)));
-  return make_js_text(rr::child_path(text_of(parent), text_of(member), text_of(index)));
 }
 
 std::optional<WasmSession::Target> WasmSession::find_target(const JsValue& path, const JsValue& member) {

@@ -101,8 +101,6 @@ class WasmSession {
   JsValue known_definitions() const;
   /// The members of an object that was found (see make_js_members()); undefined for others.
   JsValue members(const JsValue& path) const;
-  /// The path of an object below `parent`; `index` undefined, or its text.
-  JsValue child_path(const JsValue& parent, const JsValue& member, const JsValue& index) const;
 
  private:
   /// The member that a request is for.

@@ -133,7 +133,6 @@ interface WasmSession extends CoreExports {
   known_definitions(): Handle;
   definition(name: Handle): Handle;
   members(path: Handle): Handle;
-  child_path(parent: Handle, member: Handle, index: Handle): Handle;
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
@@ -453,11 +452,6 @@ export class Core {
   /** Of an object that was found. */
   members(path: string): MemberInfo[] {
     return (this.#values.take(this.#session.members(this.#give(path))) as MemberInfo[] | undefined) ?? [];
-  }
-
-  childPath(parent: string, member: string, index: string | undefined): string {
-    const path = this.#session.child_path(this.#give(parent), this.#give(member), this.#give(index));
-    return this.#values.take(path) as string;
   }
 
   #atNow(): WasmSession {

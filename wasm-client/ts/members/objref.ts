@@ -7,15 +7,24 @@ export interface AnyObjRef {
   get(index?: unknown, options?: CallOptions): Promise<RemoteObject>;
 }
 
-export function makeObjref({ session, path, info, findObject }: MemberContext): AnyObjRef {
+export function makeObjref({ path, info, findObject }: MemberContext): AnyObjRef {
   return Object.freeze({
     get: async (given: unknown, options: CallOptions = {}) => {
       const { index, rest } = readIndex(info.name, info.type, given);
-      const child = session.look((core) => core.childPath(path, info.name, index));
-      // Without a session the look-up itself says why.
-      return findObject(child ?? path, { ...rest, ...options });
+      return findObject(childPath(path, info.name, index), { ...rest, ...options });
     },
   } satisfies AnyObjRef);
+}
+
+/** As child_path() in core/session/service_path.cpp. */
+function childPath(parent: string, member: string, index: string | undefined): string {
+  const path = `${parent}.${member}`;
+  if (index === undefined) return path;
+  const encoded = Array.from(new TextEncoder().encode(index), (byte) => {
+    const letter = String.fromCharCode(byte);
+    return /[A-Za-z0-9]/.test(letter) ? letter : `%${byte.toString(16).padStart(2, "0")}`;
+  });
+  return `${path}[${encoded.join("")}]`;
 }
 
 /** The index as text. Without one in the definition, CallOptions may stand first. */

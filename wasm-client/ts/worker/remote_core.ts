@@ -183,18 +183,6 @@ export class RemoteCore {
     return this.#members.get(path)?.members ?? [];
   }
 
-  /** Source: encode_path_index() in core/session/service_path.cpp. */
-  childPath(parent: string, member: string, index: string | undefined): string {
-    const path = `${parent}.${member}`;
-    if (index === undefined) return path;
-    const bytes = new TextEncoder().encode(index);
-    const encoded = Array.from(bytes, (byte) => {
-      const letter = String.fromCharCode(byte);
-      return /[A-Za-z0-9]/.test(letter) ? letter : `%${byte.toString(16).padStart(2, "0")}`;
-    });
-    return `${path}[${encoded.join("")}]`;
-  }
-
   /** Session's own, or nothing where it concerns this class alone. */
   #read(event: HostEvent): CoreEvent | undefined {
     this.#see(event.seen);
