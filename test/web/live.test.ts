@@ -6,6 +6,7 @@ import { definitionsOf } from "../../web/src/live/definitions";
 import { Feed } from "../../web/src/live/feed";
 import { pause } from "../../web/src/live/pause";
 import { Pulse } from "../../web/src/live/pulse";
+import { Shared } from "../../web/src/live/shared";
 
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
@@ -59,6 +60,21 @@ describe("a pulse", () => {
     }
     expect(ask).toHaveBeenCalledTimes(3);
   });
+});
+
+test("what is shared is made for the first, and ends with the last, however often one of them closes it", () => {
+  const shared = new Shared<string, string>();
+  const end = vi.fn();
+  const make = vi.fn(() => ({ value: "made", end }));
+  const [one, two] = [shared.open("a", make), shared.open("a", make)];
+  expect([make.mock.calls.length, one.value, two.value, shared.values]).toEqual([1, "made", "made", ["made"]]);
+  one.close();
+  one.close();
+  expect([end.mock.calls.length, shared.values]).toEqual([0, ["made"]]);
+  two.close();
+  expect([end.mock.calls.length, shared.values]).toEqual([1, []]);
+  shared.open("a", make);
+  expect(make).toHaveBeenCalledTimes(2);
 });
 
 describe("a pause", () => {

@@ -5,6 +5,7 @@ import { explain } from "../robot/remote";
 import type { Account, Remote } from "../robot/remote";
 import { Pace } from "./pace";
 import { pause, untilDone } from "./pause";
+import { Shared } from "./shared";
 
 export type FeedKind = "wire" | "pipe" | "property" | "event";
 
@@ -95,29 +96,20 @@ export class Feed {
   }
 }
 
-const feeds = new Map<Remote, Map<string, { feed: Feed; users: number }>>();
+const feeds = new Shared<Remote, Shared<string, Feed>>();
 
 /** Joins whoever looks at it already. */
 export function openFeed(object: Remote, kind: FeedKind, member: string): { feed: Feed; close: () => void } {
-  const ofObject = feeds.get(object) ?? new Map<string, { feed: Feed; users: number }>();
-  feeds.set(object, ofObject);
-  const key = `${kind} ${member}`;
-  const entry = ofObject.get(key) ?? { feed: new Feed(object, kind, member), users: 0 };
-  ofObject.set(key, entry);
-  if (entry.users++ === 0) entry.feed.start();
-  let isOpen = true;
-  const close = (): void => {
-    if (!isOpen) return;
-    isOpen = false;
-    if (--entry.users > 0) return;
-    entry.feed.stop();
-    ofObject.delete(key);
-    if (ofObject.size === 0) feeds.delete(object);
-  };
-  return { feed: entry.feed, close };
+  const ofObject = feeds.open(object, () => ({ value: new Shared<string, Feed>(), end: () => undefined }));
+  const { value: feed, close } = ofObject.value.open(`${kind} ${member}`, () => {
+    const made = new Feed(object, kind, member);
+    made.start();
+    return { value: made, end: () => made.stop() };
+  });
+  return { feed, close: () => (close(), ofObject.close()) };
 }
 
 /** All that this page follows now. */
 export function openFeeds(): Feed[] {
-  return [...feeds.values()].flatMap((ofObject) => [...ofObject.values()].map(({ feed }) => feed));
+  return feeds.values.flatMap(({ values }) => values);
 }

@@ -9,6 +9,7 @@ import { isRecord, text } from "../gateway/fields";
 import { session } from "../gateway/session";
 import { Link, openIn } from "../robot/link";
 import type { LinkState } from "../robot/link";
+import { Shared } from "./shared";
 import { useFeed } from "./use_feed";
 
 export interface Holder {
@@ -37,7 +38,7 @@ export function useHolders({ device, service, object }: { device: string; servic
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
     const opened = openGateway();
-    setLink(opened.link);
+    setLink(opened.value);
     return opened.close;
   }, []);
   const state = useStore(link?.state ?? nowhere);
@@ -94,17 +95,12 @@ function kindOf(kind: unknown): Holder["what"] {
   return kind === "client" || kind === "monitor" ? kind : "user";
 }
 
-let opened: { link: Link; users: number } | null = null;
+const gateways = new Shared<"gateway", Link>();
 
 /** One connection, however many panels look. */
-function openGateway(): { link: Link; close: () => void } {
-  opened ??= { link: new Link(() => session.withTicket(socketUrl("gateway", "gateway")), "gateway"), users: 0 };
-  const mine = opened;
-  mine.users++;
-  const close = (): void => {
-    if (--mine.users > 0) return;
-    mine.link.dispose();
-    if (opened === mine) opened = null;
-  };
-  return { link: mine.link, close };
+function openGateway(): { value: Link; close: () => void } {
+  return gateways.open("gateway", () => {
+    const link = new Link(() => session.withTicket(socketUrl("gateway", "gateway")), "gateway");
+    return { value: link, end: () => link.dispose() };
+  });
 }

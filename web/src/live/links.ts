@@ -12,21 +12,17 @@ import type { Remote } from "../robot/remote";
 import { parseStep, splitSteps } from "../app/router";
 import type { PathStep } from "../app/router";
 import { keepFound } from "../robot/walk";
+import { Shared } from "./shared";
 
-const links = new Map<string, { link: Link; dispose: () => void; users: number }>();
+const links = new Shared<string, Link>();
 const nowhere = new Store<LinkState>({ kind: "connecting" });
 
-function openLink(place: string, list: DeviceList): { link: Link; close: () => void } {
+function openLink(place: string, list: DeviceList): { value: Link; close: () => void } {
   const [device = "", service = ""] = place.split("/").map(decodeURIComponent);
-  const entry = links.get(place) ?? { ...linkTo(device, service, list), users: 0 };
-  links.set(place, entry);
-  entry.users++;
-  const close = (): void => {
-    if (--entry.users > 0) return;
-    entry.dispose();
-    links.delete(place);
-  };
-  return { link: entry.link, close };
+  return links.open(place, () => {
+    const { link, dispose } = linkTo(device, service, list);
+    return { value: link, end: dispose };
+  });
 }
 
 export interface ObjectState {
@@ -44,7 +40,7 @@ export function useObject(own: Link, from: string, path: string, list: DeviceLis
   const [other, setOther] = useState<{ from: string; link: Link } | null>(null);
   useEffect(() => {
     if (from === "") return setOther(null);
-    const { link, close } = openLink(from, list);
+    const { value: link, close } = openLink(from, list);
     setOther({ from, link });
     return close;
   }, [from, list]);
