@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/limits/memory_budget.hpp"
-#include "server/upstream/device.hpp"
+#include "server/upstream/device_registry.hpp"
 
 namespace rrgate {
 
