@@ -49,9 +49,8 @@ def global_names(taken: set[str]) -> set[str]:
 
 def names_of_headers() -> dict[str, set[str]]:
     """By the file that lists them. A macro that is defined as itself replaces nothing."""
-    all_macros = macros()
-    replaced = {name for name, text in all_macros.items() if NAME.fullmatch(name) and text != name}
-    return {"cpp_macros.inc": replaced, "cpp_globals.inc": global_names(set(all_macros))}
+    replaced = {name for name, text in macros().items() if text != name}
+    return {"cpp_macros.inc": {name for name in replaced if NAME.fullmatch(name)}, "cpp_globals.inc": global_names(replaced)}
 
 
 def listed(folder: pathlib.Path, file: str) -> set[str]:

@@ -5,6 +5,14 @@
 
 namespace rr {
 
+namespace {
+
+Error generator_has_ended() {
+  return make_error(ErrorCode::operation_aborted, "the generator has ended");
+}
+
+}  // namespace
+
 ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory,
                              ServiceSessionOptions options, std::unique_ptr<ByteStream> stream)
     : SessionDriver(std::move(stream), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
@@ -99,8 +107,10 @@ void ServiceClient::finish_late_call(CallId id, const Result<Value>& answer) {
   const auto& member = *found.mapped().member;
   if (owner_ && !answer && is_unhandled(answer.error()))
     owner_->report(describe_failure(member_kind_name(member.kind), member.name, answer.error()));
-  session_.reply(id, answer, read_clocks());
-  if (found.mapped().generator != 0) finish_step(found.mapped().generator, answer.has_error());
+  const auto generator = found.mapped().generator;
+  const bool is_aborted = generator != 0 && !generators_.contains(generator);
+  session_.reply(id, is_aborted ? Result<Value>(generator_has_ended()) : answer, read_clocks());
+  if (generator != 0) finish_step(generator, answer.has_error());
   settle();
 }
 
@@ -160,7 +170,7 @@ std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
   }
   if (is_next) return take_step(called);
   const auto ended = generators_.extract(found);
-  abort_steps(called.generator, ended.mapped(), "the generator was aborted");
+  abort_steps(called.generator, ended.mapped());
   const auto& generator = *ended.mapped().generator;
   if (const auto& handler = called.kind == CallKind::generator_close ? generator.close : generator.abort) handler();
   return Value{};
@@ -193,24 +203,19 @@ void ServiceClient::abandon_generator(const Generator& generator) {
   if (generator.abort) notify("a generator's", "abort", generator.abort);
 }
 
-/// The client is answered at once, whatever the handler of the step that is under way still does.
-void ServiceClient::abort_steps(GeneratorId id, const RunningGenerator& ended, const char* why) {
-  const Now now = read_clocks();
-  const auto error = make_error(ErrorCode::operation_aborted, why);
-  std::erase_if(late_calls_, [&](const auto& each) {
-    const auto& [call_id, late] = each;
-    if (late.generator != id) return false;
-    session_.reply(call_id, error, now);
-    if (const auto call = late.call.lock()) call->cancel();
-    return true;
-  });
-  for (const auto& waiting : ended.waiting) session_.reply(waiting.id, error, now);
+/// The step that is under way is answered when its handler has ended, which that of a coroutine does now: so many are
+/// in work as the session allows, whatever the client opens and aborts.
+void ServiceClient::abort_steps(GeneratorId id, const RunningGenerator& ended) {
+  for (const auto& [call_id, late] : late_calls_)
+    if (late.generator == id)
+      if (const auto call = late.call.lock()) call->cancel();
+  for (const auto& waiting : ended.waiting) session_.reply(waiting.id, generator_has_ended(), read_clocks());
 }
 
 void ServiceClient::handle(const GeneratorEnded& ended, Now) {
   const auto left = generators_.extract(ended.id);
   if (!left) return;
-  abort_steps(ended.id, left.mapped(), "the generator has ended");
+  abort_steps(ended.id, left.mapped());
   abandon_generator(*left.mapped().generator);
 }
 

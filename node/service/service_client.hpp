@@ -80,7 +80,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   std::optional<Result<Value>> answer_generator(Called& called);
   Result<Value> take_step(const Called& called);
   void finish_step(GeneratorId id, bool has_failed);
-  void abort_steps(GeneratorId id, const RunningGenerator& ended, const char* why);
+  void abort_steps(GeneratorId id, const RunningGenerator& ended);
   /// Tells a generator that nobody will ask it any more.
   void abandon_generator(const Generator& generator);
   void handle(const ClientConnected& connected, Now now);

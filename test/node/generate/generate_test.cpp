@@ -121,9 +121,10 @@ TEST_CASE("generate ts: constants of a definition are written once, however many
 
 TEST_CASE("generate cpp: services whose names begin like a function or type of the C library, and others") {
   const Folder folder;
-  for (const auto& [service, name_space] : {std::pair("exp.log", "exp_::log"), std::pair("log2.arm", "log2_::arm"),
-                                            std::pair("int8_t.log2", "int8_t_::log2"), std::pair("FILE.x", "FILE_::x"),
-                                            std::pair("com2.x", "com2::x"), std::pair("Foo.bar", "Foo::bar")}) {
+  for (const auto& [service, name_space] :
+       {std::pair("exp.log", "exp_::log"), std::pair("log2.arm", "log2_::arm"),
+        std::pair("int8_t.log2", "int8_t_::log2"), std::pair("FILE.x", "FILE_::x"),
+        std::pair("MSG_PEEK.x", "MSG_PEEK_::x"), std::pair("com2.x", "com2::x"), std::pair("Foo.bar", "Foo::bar")}) {
     const auto file =
         folder.write("words.robdef", "service " + std::string(service) + "\nstdver 0.10\nobject exp\nend\n");
     CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_ok);

@@ -381,9 +381,9 @@ TEST_CASE("a generator that waits ends at once when its object is replaced, whic
     device.patient->nurse.reset();
     device.patient->service->root().release("nurse");
   });
+  device.patient->gate.open();  // one that blocks can't be cancelled
   REQUIRE(steps.wait());
   CHECK(steps.are_aborted());
-  device.patient->gate.open();  // one that blocks can't be cancelled
   const auto end = std::chrono::steady_clock::now() + 10s;
   while (!replaced.expired() && std::chrono::steady_clock::now() < end) REQUIRE(one.call("quick", 1) == Value(1));
   CHECK(replaced.expired());
