@@ -13,6 +13,7 @@ import { makeProperty } from "./members/property.js";
 import { makeWire } from "./members/wire.js";
 import { checkTimeout, isWithin, releasedObject } from "./session.js";
 import type { Session } from "./session.js";
+import { noStats } from "./wasm_module.js";
 import { checkSignal, within } from "./within.js";
 import type {
   CallOptions,
@@ -160,7 +161,7 @@ export class Info implements ObjectInfo {
   readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
   readonly #attributes: Map<string, RrValue>;
   readonly #node: { id: string; name: string };
-  #stats: SessionStats = { messagesReceived: 0, messagesSent: 0, bytesReceived: 0, bytesSent: 0 };
+  #stats: SessionStats = noStats;
   #types: string[] = [];
 
   constructor(

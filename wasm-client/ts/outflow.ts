@@ -6,13 +6,31 @@ import type { Transport } from "./transport.js";
  * urgent requests go ahead. One more frame may be on top of it. With the time below, Chromium sends 28 MB/s by it; with
  * 32 KiB it is 15.
  */
-export const transmitMark = 64 * 1024;
+const transmitMark = 64 * 1024;
 /** While this many bytes wait for the network, in the transport and in the core, so do senders that ask for room. */
 export const roomMark = 256 * 1024;
+/** Native peers take WebSocket frames of at most this many bytes. */
+export const frameLimit = 65_535;
+/** Bytes that go into a core at once; its receive buffer stays as small. */
+export const receiveLimit = 1024 * 1024;
 /** WebSockets do not say when they have room again. */
 const drainPollMs = 4;
 /** setTimeout takes little more than this. */
 const longestTimerMs = 2e9;
+
+/** Gives the transport what it has room for. `poll`: bytes that stay until `transmitted` is told of them. */
+export function transmit(
+  transport: Transport,
+  poll: () => Uint8Array | undefined,
+  transmitted: (size: number) => void,
+): void {
+  while (transport.buffered < transmitMark) {
+    const bytes = poll();
+    if (!bytes) return;
+    transport.send(bytes);
+    transmitted(bytes.length);
+  }
+}
 
 export interface LookTimer {
   /** Sees to it that there is a look in time. */

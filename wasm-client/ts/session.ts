@@ -9,7 +9,7 @@ import {
   textOf,
 } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
-import { lookTimer, roomMark, transmitMark } from "./outflow.js";
+import { lookTimer, roomMark, transmit } from "./outflow.js";
 import type { LookTimer } from "./outflow.js";
 import type { Transport } from "./transport.js";
 import type { CallOptions, RrValue } from "./types.js";
@@ -281,9 +281,11 @@ export class Session {
   #pump(): void {
     if (this.#isPumping || this.#isClosed) return; // a listener asked something: the loop below goes on with it
     this.#isPumping = true;
+    const poll = () => this.core.pollTransmit();
+    const transmitted = (size: number) => this.core.handleTransmitted(size);
     this.#guarded(() => {
       for (;;) {
-        this.#transmit();
+        transmit(this.transport, poll, transmitted);
         const event = this.core.pollEvent();
         if (!event) break;
         this.#dispatch(event);
@@ -298,15 +300,6 @@ export class Session {
 
   #hasRoom(): boolean {
     return this.transport.buffered + this.core.queuedBytes() < roomMark;
-  }
-
-  #transmit(): void {
-    while (this.transport.buffered < transmitMark) {
-      const bytes = this.core.pollTransmit();
-      if (!bytes) return;
-      this.transport.send(bytes);
-      this.core.handleTransmitted(bytes.length);
-    }
   }
 
   #dispatch(event: CoreEvent): void {

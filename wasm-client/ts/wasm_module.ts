@@ -1,9 +1,11 @@
 // The compiled core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/wasm_session.hpp, and core/session/client/client_session.hpp behind it.
-import { makeError, RobotRaconteurError, textOf } from "./errors.js";
+import { makeError, RobotRaconteurError } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
+import { Once } from "./once.js";
+import { frameLimit, receiveLimit } from "./outflow.js";
 import { platform } from "./platform.js";
 import type { MemberInfo, PipeConnectOptions, RrValue, SessionStats, TypeInfo } from "./types.js";
 
@@ -69,11 +71,6 @@ export type CoreEvent =
 /** As rr::GeneratorStep. */
 const generatorSteps = ["next", "close", "abort"] as const;
 export type GeneratorStep = (typeof generatorSteps)[number];
-
-/** Native peers take WebSocket frames of at most this many bytes. */
-const frameLimit = 65_535;
-/** Bytes that go into the core at once; its receive buffer stays as small. */
-const receiveLimit = 1024 * 1024;
 
 /* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 /** What src/bindings.cpp exports. */
@@ -145,14 +142,14 @@ export interface InitOptions {
 }
 
 let source: InitOptions["wasm"];
-let compiled: Promise<WebAssembly.Module> | undefined;
+const compiled = new Once(compile, "the protocol core could not be loaded");
 
 /**
  * Says where the protocol core comes from. Before the first connect(), subscribe() or preload().
  * @throws RobotRaconteurError InvalidOperation: it is loaded already.
  */
 export function init({ wasm }: InitOptions): void {
-  if (compiled) throw makeError("InvalidOperation", "init: the protocol core is loaded already; call it first");
+  if (compiled.isBegun) throw makeError("InvalidOperation", "init: the protocol core is loaded already; call it first");
   source = wasm;
 }
 
@@ -161,14 +158,7 @@ export function init({ wasm }: InitOptions): void {
  * @throws RobotRaconteurError (rejects) SystemResourceError: the file cannot be loaded; a later call tries again.
  */
 export async function preload(): Promise<void> {
-  await loadCore();
-}
-
-function loadCore(): Promise<WebAssembly.Module> {
-  return (compiled ??= compile().catch((error: unknown) => {
-    compiled = undefined; // the next connect() tries again
-    throw makeError("SystemResourceError", `the protocol core could not be loaded: ${textOf(error)}`);
-  }));
+  await compiled.get();
 }
 
 async function compile(): Promise<WebAssembly.Module> {
@@ -182,6 +172,9 @@ async function compile(): Promise<WebAssembly.Module> {
   return given instanceof URL ? platform.loadWasm(given) : WebAssembly.compile(given);
 }
 
+/** Of a session that has not begun. */
+export const noStats: SessionStats = { messagesReceived: 0, messagesSent: 0, bytesReceived: 0, bytesSent: 0 };
+
 /**
  * One session of the core, in an instance of its own: its memory goes with it, and a trap in it ends nothing else.
  * All methods follow the order of the sans-IO contract: after whatever is told or asked, poll.
@@ -192,7 +185,7 @@ export class Core {
 
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; those of options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
-    const code = await loadCore();
+    const code = await compiled.get();
     const values = new JsValues();
     const { exports } = await WebAssembly.instantiate(code, values.imports);
     return new Core(values, exports as unknown as WasmSession, options);

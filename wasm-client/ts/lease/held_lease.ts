@@ -4,6 +4,7 @@
 import { asyncDispose } from "../dispose.js";
 import { callSafely, ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
 import { Info } from "../object.js";
+import { isWithin } from "../session.js";
 import type { Session } from "../session.js";
 import type { CallOptions, Lease, LeaseOptions, LeaseState, ObjectInfo } from "../types.js";
 
@@ -69,7 +70,7 @@ function limitCalls(session: Session, path: string, timeout: number): () => void
   const ofSession = limits.get(session) ?? new Map<string, number>();
   limits.set(session, ofSession);
   ofSession.set(path, timeout);
-  session.timeoutAt = (asked) => [...ofSession].find(([held]) => asked === held || asked.startsWith(`${held}.`))?.[1];
+  session.timeoutAt = (asked) => [...ofSession].find(([held]) => isWithin(asked, held))?.[1];
   return () => void ofSession.delete(path);
 }
 

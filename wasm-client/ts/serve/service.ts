@@ -1,7 +1,7 @@
 // The service of a page that is a device, and its clients: bytes in and out, timers, and who answers what. Layer:
 // wasm-client/ts.
 import { callSafely, makeError, report, RobotRaconteurError, textOf } from "../errors.js";
-import { lookTimer, roomMark, transmitMark } from "../outflow.js";
+import { lookTimer, roomMark, transmit } from "../outflow.js";
 import type { LookTimer } from "../outflow.js";
 import type { Transport } from "../transport.js";
 import type { MemberInfo, RrValue } from "../types.js";
@@ -256,12 +256,9 @@ class ServedClient {
   }
 
   #transmit(): void {
-    while (this.transport.buffered < transmitMark) {
-      const bytes = this.core.pollTransmit(this.number);
-      if (!bytes) return;
-      this.transport.send(bytes);
-      this.core.handleTransmitted(this.number, bytes.length);
-    }
+    const { core, number } = this;
+    const transmitted = (size: number) => core.handleTransmitted(number, size);
+    transmit(this.transport, () => core.pollTransmit(number), transmitted);
   }
 
   #dispatch(event: ServiceEvent): void {

@@ -1,9 +1,11 @@
 // The compiled service side of the core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/serve_bindings.cpp, and core/session/service/service_session.hpp behind it.
-import { errorFields, makeError, RobotRaconteurError, textOf } from "../errors.js";
+import { errorFields, RobotRaconteurError } from "../errors.js";
 import type { ErrorFields } from "../errors.js";
 import { JsValues } from "../js_values.js";
 import type { CoreExports, Handle } from "../js_values.js";
+import { Once } from "../once.js";
+import { frameLimit, receiveLimit } from "../outflow.js";
 import { platform } from "../platform.js";
 import type { MemberInfo, RrValue } from "../types.js";
 import type { ServedObject } from "./served_object.js";
@@ -74,10 +76,6 @@ export type FindChild = (
   type: string,
 ) => ServedObject;
 
-/** Native peers take WebSocket frames of at most this many bytes. */
-const frameLimit = 65_535;
-const receiveLimit = 1024 * 1024;
-
 /* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 interface WasmService extends CoreExports {
   _initialize(): void;
@@ -111,7 +109,11 @@ interface WasmService extends CoreExports {
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
-let compiled: Promise<WebAssembly.Module> | undefined;
+const compiled = new Once(
+  // Written out so that bundlers see it and ship the file.
+  () => platform.loadWasm(new URL("./rrgate-serve.wasm", import.meta.url)),
+  "the protocol core for services could not be loaded",
+);
 
 /**
  * One service and its clients, by their numbers, in an instance of the core. All methods follow the order of the sans-IO
@@ -123,12 +125,7 @@ export class ServiceCore {
 
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; ServiceDefinitionError, ... */
   static async create(options: ServiceOptions, root: ServedObject, findChild: FindChild): Promise<ServiceCore> {
-    // Written out so that bundlers see it and ship the file.
-    compiled ??= platform.loadWasm(new URL("./rrgate-serve.wasm", import.meta.url)).catch((error: unknown) => {
-      compiled = undefined; // the next one tries again
-      throw makeError("SystemResourceError", `the protocol core for services could not be loaded: ${textOf(error)}`);
-    });
-    const code = await compiled;
+    const code = await compiled.get();
     const values = new JsValues();
     const find = (parent: Handle, member: Handle, index: Handle, path: Handle, type: Handle): Handle => {
       const taken = [parent, member, index, path, type].map((handle) => values.take(handle));

@@ -1,8 +1,8 @@
 // The compiled USB half of the core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/usb_bindings.cpp, and core/hardware/usb_probe.hpp and usb_link.hpp behind it.
-import { makeError, textOf } from "../errors.js";
 import { JsValues } from "../js_values.js";
 import type { CoreExports, Handle } from "../js_values.js";
+import { Once } from "../once.js";
 import { platform } from "../platform.js";
 import type { WebUsbConfiguration, WebUsbSetup } from "./webusb.js";
 
@@ -73,7 +73,11 @@ const recipients = ["device", "interface", "endpoint", "other"] as const;
 const inBit = 0x80;
 const endpointBits = 0x0f;
 
-let compiled: Promise<WebAssembly.Module> | undefined;
+const compiled = new Once(
+  // Written out so that bundlers see it and ship the file.
+  () => platform.loadWasm(new URL("./rrgate-usb.wasm", import.meta.url)),
+  "the protocol core for USB could not be loaded",
+);
 
 /**
  * One claim of one device, in an instance of its own: first the probe that finds out who it is, then its streams.
@@ -85,12 +89,7 @@ export class UsbCore {
 
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded. */
   static async create(configuration: WebUsbConfiguration): Promise<UsbCore> {
-    // Written out so that bundlers see it and ship the file.
-    compiled ??= platform.loadWasm(new URL("./rrgate-usb.wasm", import.meta.url)).catch((error: unknown) => {
-      compiled = undefined; // the next one tries again
-      throw makeError("SystemResourceError", `the protocol core for USB could not be loaded: ${textOf(error)}`);
-    });
-    const code = await compiled;
+    const code = await compiled.get();
     const values = new JsValues();
     const { exports } = await WebAssembly.instantiate(code, values.imports);
     return new UsbCore(values, exports as unknown as WasmUsb, configuration);

@@ -1,11 +1,11 @@
 // One connection in the worker: transport, core, and what page and core have to tell one another. Layer: wasm-client/ts/worker.
 import { errorFields, makeError, RobotRaconteurError, textOf } from "../errors.js";
-import { lookTimer, roomMark, transmitMark } from "../outflow.js";
+import { lookTimer, roomMark, transmit } from "../outflow.js";
 import type { LookTimer } from "../outflow.js";
 import type { Proof } from "../platform.js";
 import type { Transport, TransportListener } from "../transport.js";
 import type { RrValue, SessionStats } from "../types.js";
-import { Core, preload } from "../wasm_module.js";
+import { Core, noStats, preload } from "../wasm_module.js";
 import type { CoreEvent, CoreOptions } from "../wasm_module.js";
 import type { FromHost, Seen, ToHost } from "./messages.js";
 import { Outbox } from "./outbox.js";
@@ -49,7 +49,7 @@ export class Host {
   readonly #conflated = new Map<string, number>();
   #definitionCount = -1;
   /** The newest, also of a core that is no more. */
-  #stats: SessionStats = { messagesReceived: 0, messagesSent: 0, bytesReceived: 0, bytesSent: 0 };
+  #stats: SessionStats = noStats;
   #taken = 0;
   #told = { queued: 0, taken: 0 };
 
@@ -201,13 +201,8 @@ export class Host {
   }
 
   #transmit(core: Core): void {
-    const transport = this.#transport as Transport;
-    while (transport.buffered < transmitMark) {
-      const bytes = core.pollTransmit();
-      if (!bytes) return;
-      transport.send(bytes);
-      core.handleTransmitted(bytes.length);
-    }
+    const transmitted = (size: number) => core.handleTransmitted(size);
+    transmit(this.#transport as Transport, () => core.pollTransmit(), transmitted);
   }
 
   /** Puts an event of the core among what waits for the page. */

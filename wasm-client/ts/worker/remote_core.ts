@@ -2,7 +2,9 @@
 // tell comes in messages. Layer: wasm-client/ts/worker.
 import { errorFields, makeError, report, RobotRaconteurError } from "../errors.js";
 import type { ErrorFields } from "../errors.js";
+import { isWithin } from "../session.js";
 import type { PipeConnectOptions } from "../types.js";
+import { noStats } from "../wasm_module.js";
 import type { Core, CoreEvent, GeneratorStep, RawDefinition } from "../wasm_module.js";
 import type { HostEvent, News, Seen, ToHost } from "./messages.js";
 import { copyOf, weigh } from "./passage.js";
@@ -25,7 +27,7 @@ export class RemoteCore {
   readonly #wires = new Map<string, number>();
   readonly #members = new Map<string, Seen["members"]>();
   #seen: Seen = {};
-  #stats: News["stats"] = { messagesReceived: 0, messagesSent: 0, bytesReceived: 0, bytesSent: 0 };
+  #stats: News["stats"] = noStats;
   #lastId = 0;
   #timeout = 0;
   #isUrgent = false;
@@ -207,8 +209,7 @@ export class RemoteCore {
         // Where the page has asked for this wire again, it is the connection before that was closed.
         return this.#wires.has(`${event.path} ${event.member}`) ? undefined : event;
       case "path_released":
-        for (const path of this.#members.keys())
-          if (path === event.path || path.startsWith(`${event.path}.`)) this.#members.delete(path);
+        for (const path of this.#members.keys()) if (isWithin(path, event.path)) this.#members.delete(path);
         return event;
       case "closed":
         this.#isOver = true;

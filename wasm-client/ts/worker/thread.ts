@@ -1,5 +1,6 @@
 // The worker of a page, and connections by it. Layer: wasm-client/ts/worker.
-import { makeError, RobotRaconteurError, textOf } from "../errors.js";
+import { makeError, RobotRaconteurError } from "../errors.js";
+import { Once } from "../once.js";
 import type { Proof } from "../platform.js";
 import type { CoreTransport, OpenTransport } from "../transport.js";
 import type { Core, InitOptions } from "../wasm_module.js";
@@ -13,14 +14,14 @@ export interface WorkerInitOptions extends InitOptions {
 }
 
 let options: WorkerInitOptions = {};
-let started: Promise<Worker> | undefined;
+const thread = new Once(start, "the worker could not be started");
 
 /**
  * Says where the protocol core and the worker come from. Before the first connect(), subscribe() or preload().
  * @throws RobotRaconteurError InvalidOperation: the worker is there already.
  */
 export function init(given: WorkerInitOptions): void {
-  if (started) throw makeError("InvalidOperation", "init: the worker is started already; call it first");
+  if (thread.isBegun) throw makeError("InvalidOperation", "init: the worker is started already; call it first");
   options = given;
 }
 
@@ -29,13 +30,13 @@ export function init(given: WorkerInitOptions): void {
  * @throws RobotRaconteurError (rejects) SystemResourceError: a file cannot be loaded; a later call tries again.
  */
 export async function preload(): Promise<void> {
-  await ask(await startThread(), (port) => ({ kind: "preload", port }));
+  await ask(await thread.get(), (port) => ({ kind: "preload", port }));
 }
 
 /** Transports whose socket and core are in the worker. */
 export function openInWorker({ token, headers }: Proof): OpenTransport {
   return async (url, listener) => {
-    const thread = await startThread();
+    const worker = await thread.get();
     const { port1: port, port2 } = new MessageChannel();
     const say = (message: ToHost, transfer: ArrayBuffer[] = []) => port.postMessage(message, transfer);
     const core = new RemoteCore(say);
@@ -65,7 +66,7 @@ export function openInWorker({ token, headers }: Proof): OpenTransport {
       }
     };
     const proof = copyOf({ token, headers }) as Proof;
-    thread.postMessage({ kind: "open", url: url.href, proof, port: port2 } satisfies ToThread, [port2]);
+    worker.postMessage({ kind: "open", url: url.href, proof, port: port2 } satisfies ToThread, [port2]);
     await answered();
     return {
       send: () => undefined,
@@ -85,13 +86,6 @@ export function openInWorker({ token, headers }: Proof): OpenTransport {
 }
 
 const nothing = new Uint8Array(0);
-
-function startThread(): Promise<Worker> {
-  return (started ??= start().catch((error: unknown) => {
-    started = undefined; // the next connect() tries again
-    throw makeError("SystemResourceError", `the worker could not be started: ${textOf(error)}`);
-  }));
-}
 
 async function start(): Promise<Worker> {
   const { wasm } = options;
