@@ -48,7 +48,7 @@ export const MOST_PANELS = 64;
 const MOST_TEXT = 1024 * 1024; // with some models of robots
 
 /** @throws Error with what is wrong, where, and what was expected. */
-export function readBoard(json: unknown): Board {
+function readBoard(json: unknown): Board {
   const { board, panels, columns = COLUMNS, stop } = record(json, "the file");
   if (board !== 1) throw new Error(`the file: field "board" is ${say(board)}, expected 1 (a board of this page)`);
   if (!Array.isArray(panels)) throw new Error(`the file: field "panels" is ${say(panels)}, expected a list`);

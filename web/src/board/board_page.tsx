@@ -195,7 +195,7 @@ function Waiting() {
   );
 }
 
-export function boardKey({ device, service, path }: ServiceRoute): string {
+function boardKey({ device, service, path }: ServiceRoute): string {
   return [device, service, ...path.map(formatStep)].map(encodeURIComponent).join("/");
 }
 

@@ -19,7 +19,7 @@ export interface Placed extends Place {
   id: string;
 }
 
-export const SMALLEST = { w: 2, h: 3 };
+const SMALLEST = { w: 2, h: 3 };
 
 /** The same panels with `id` at `place`; whatever was there makes room below. */
 export function put<T extends Placed>(

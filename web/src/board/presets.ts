@@ -305,7 +305,7 @@ function structOf(member: Member, { definitions, scope }: Described) {
 }
 
 /** By the names of the fields: bytes, with a width and a height here or in an inner struct. */
-export function isPicture(member: Member, object: Described): boolean {
+function isPicture(member: Member, object: Described): boolean {
   if (!["wire", "pipe"].includes(member.kind) || member.modifiers.includes("writeonly")) return false;
   const struct = structOf(member, object);
   if (!struct?.fields.some(({ name, type }) => name === "data" && type.startsWith("uint8["))) return false;

@@ -25,7 +25,7 @@ interface Place {
 }
 
 /** The robot's own webcam service, else the first one that another device offers. */
-export function findCamera(gateway: GatewayState, robot: string): Place | null {
+function findCamera(gateway: GatewayState, robot: string): Place | null {
   const found = (devicesOf(gateway) ?? []).flatMap((device) =>
     device.services
       .filter((service) => service.type.endsWith(".WebcamHost"))

@@ -21,7 +21,7 @@ export type ControlState =
   | { kind: "lost"; reason: string; byOthers: boolean };
 
 /** Without a renewal for so long the gateway makes the device safe; renewed three times as often. */
-export const DEADMAN_MS = 1000;
+const DEADMAN_MS = 1000;
 
 export class Control {
   readonly state: Store<ControlState>;

@@ -29,12 +29,6 @@ export function formatNumber(value: number): string {
   return String(Number(value.toPrecision(6)));
 }
 
-export function formatBytes(count: number): string {
-  if (count < 1024) return `${count} B`;
-  if (count < 1024 * 1024) return `${(count / 1024).toFixed(count < 10240 ? 1 : 0)} KB`;
-  return `${(count / 1024 / 1024).toFixed(1)} MB`;
-}
-
 /** `01 a0 ff`, at most `limit` bytes and then an ellipsis. */
 export function formatHex(bytes: ArrayLike<number>, limit = 24): string {
   const shown = Array.from({ length: Math.min(bytes.length, limit) }, (_, i) =>

@@ -66,8 +66,3 @@ export function isComplex(base: string): boolean {
 export function isNumeric(base: string): boolean {
   return isInteger(base) || isFloat(base) || isComplex(base) || base === "bool";
 }
-
-/** The last segment of a qualified name: `experimental.create.Create` gives `Create`. */
-export function shortName(qualified: string): string {
-  return qualified.slice(qualified.lastIndexOf(".") + 1);
-}

@@ -5,7 +5,7 @@
 import { about, compose, ORIGIN } from "./frames";
 import type { Pose, Turn, Vector } from "./frames";
 
-export const MOST_CHARACTERS = 1024 * 1024;
+const MOST_CHARACTERS = 1024 * 1024;
 const MOST_LINKS = 500;
 const MOST_SHAPES = 1000;
 const MOST_METRES = 1000;
