@@ -82,7 +82,7 @@ def test_http_hears_what_was_recorded_with_its_time_stamps(create, begin_gateway
         while not heard or heard[-1][0] < STATES[-1][0]:
             news = socket.next(subscription=number)
             heard.append((int(news["time"]["seconds"]) * 10**9 + news["time"]["nanoseconds"], news["value"]))
-    assert len(heard) > 10 and is_in_order(heard, STATES) and heard[-1] == STATES[-1]
+    assert is_in_order(heard, STATES) and heard[-1] == STATES[-1]
     refused = ask(gateway.port, "POST", f"{DEVICES}/{DEVICE}/Create/Drive", {"velocity": 1, "radius": 1})
     assert refused.status == 501 and "this is a replay" in refused.json["detail"]
     assert ask(gateway.port, "POST", API, {"device": DEVICE, "service": "Create"}).status == 409  # it is recorded already
@@ -103,7 +103,7 @@ def test_the_real_package_hears_what_was_recorded_and_goes_to_another_time(creat
         while not heard or heard[-1][0] < STATES[-1][0]:
             assert time.monotonic() < deadline, heard[-3:]
             time.sleep(0.02)
-        assert len(heard) > 10 and is_in_order(heard, STATES) and heard[-1] == STATES[-1]
+        assert is_in_order(heard, STATES) and heard[-1] == STATES[-1]
         control.seek(2)
         first = wait_for(lambda: heard[-1], lambda last: last[1] != STATES[-1][1])
         assert first[0] > STATES[-1][0]  # what is older than the last would not be heard
