@@ -82,9 +82,11 @@ rr::Result<McapReader> McapReader::open(const std::string& path) {
   std::string magic(mcap_magic.size(), '\0');
   out.file_.seekg(0);
   out.file_.read(magic.data(), static_cast<std::streamsize>(magic.size()));
-  if (end < 0 || (!out.file_ && !out.file_.eof()))
-    return rr::make_error(rr::ErrorCode::system_resource_error,
-                          path + ": can't be read: " + std::generic_category().message(errno));
+  if (end < 0 || (!out.file_ && !out.file_.eof())) {
+    const int why = errno;
+    return rr::make_error(why == ENOENT ? rr::ErrorCode::resource_not_found : rr::ErrorCode::system_resource_error,
+                          path + ": can't be read: " + std::generic_category().message(why));
+  }
   magic.resize(static_cast<std::size_t>(out.file_.gcount()));
   if (magic != mcap_magic)
     return malformed(path + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));

@@ -19,7 +19,8 @@ struct McapRecord {
 };
 
 /// Takes nothing on trust: what it allocates is in the file. Errors   data_serialization_error, each with the file, the
-/// record and the byte, what was found and what was expected; system_resource_error.
+/// record and the byte, what was found and what was expected; resource_not_found: there is no such file;
+/// system_resource_error.
 class McapReader {
  public:
   static rr::Result<McapReader> open(const std::string& path);

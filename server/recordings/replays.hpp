@@ -28,8 +28,9 @@ class Replays {
   Replays& operator=(const Replays&) = delete;
 
   /// Returns once the file is a device, by replay_of_file(). One that is played already goes on.
-  /// Errors   invalid_state: so many are played already; data_serialization_error, system_resource_error: a file that
-  /// can't be played; out_of_system_resource: it takes more memory than is left; operation_cancelled.
+  /// Errors   invalid_state: so many are played already; resource_not_found: there is no such file;
+  /// data_serialization_error, system_resource_error: a file that can't be played; out_of_system_resource: it takes
+  /// more memory than is left; operation_cancelled: it was ended before it began.
   rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
   /// Of a device that plays a recording. Its clients hear that its services end.
   void end(std::string_view device);

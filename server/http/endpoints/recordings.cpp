@@ -166,9 +166,13 @@ AuditEntryPtr begin_entry(GatewayState& gateway, const Request& request, const R
   return gateway.access().begin(request.identity, wanted_of(recording), {}, event);
 }
 
+void finish_entry(const AuditEntryPtr& entry, std::string_view name, const rr::Result<>& done) {
+  if (entry) entry->finish(done ? Outcome::ok : Outcome::error, done ? name : done.error().message);
+}
+
 Response answer_recorded(const AuditEntryPtr& entry, std::string_view name, const rr::Result<>& done,
                          Response response) {
-  if (entry) entry->finish(done ? Outcome::ok : Outcome::error, done ? name : done.error().message);
+  finish_entry(entry, name, done);
   return done ? std::move(response) : failure_answer(done.error());
 }
 
@@ -238,6 +242,23 @@ std::string names_of_replays(GatewayState& gateway, const Identity& who) {
   return out + (out.empty() ? "" : " and ") + std::to_string(others) + " of others";
 }
 
+/// `why`  see Replays::play().
+Response refuse_to_play(GatewayState& gateway, const rr::Error& why) {
+  switch (why.code) {
+    case rr::ErrorCode::data_serialization_error:  // the file's fault, not that of who asks
+    case rr::ErrorCode::operation_cancelled:
+      return problem_response(409, why.message);
+    case rr::ErrorCode::out_of_system_resource: {
+      gateway.reject(Rejection::memory);
+      auto response = problem_response(503, why.message);
+      response.set("Retry-After", "60");
+      return response;
+    }
+    default:
+      return error_answer(why);
+  }
+}
+
 RecordingsAnswer play_recording(GatewayState& gateway, const Request& request, RecordingPlace place) {
   auto& recordings = gateway.recordings();
   const auto found = co_await recordings.find_for(gateway.access(), request.identity, place.name);
@@ -252,11 +273,11 @@ RecordingsAnswer play_recording(GatewayState& gateway, const Request& request, R
   const auto why = begun ? rr::Error{} : begun.error();
   if (why.code == rr::ErrorCode::invalid_state)
     begun = rr::make_error(why.code, why.message + ": " + names_of_replays(gateway, request.identity));
-  if (why.code == rr::ErrorCode::data_serialization_error)  // the file's fault, not that of who asks
-    begun = rr::make_error(rr::ErrorCode::invalid_state, why.message);
+  finish_entry(entry, found->name, begun);
+  if (!begun) co_return refuse_to_play(gateway, begun.error());
   auto response = json_answer(is_new ? 201 : 200, Json{{"device", device}});
   response.set("Location", request.arrival.prefix + "/api/v1/devices/" + device);
-  co_return answer_recorded(entry, found->name, begun, std::move(response));
+  co_return response;
 }
 
 RecordingsAnswer end_playing(GatewayState& gateway, const Request& request, RecordingPlace place) {

@@ -7,41 +7,14 @@
 #include <filesystem>
 
 #include "core/session/service/service_index.hpp"
-#include "server/json/schema.hpp"
-#include "server/record/recording_writer.hpp"
 #include "server/recordings/recording_files.hpp"
+#include "test/server/support/recorded_robot.hpp"
 #include "test/support/folder.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
 
 namespace {
-
-constexpr const char* definition = R"(service com.x
-stdver 0.10
-object Robot
-    wire int32 count [readonly]
-end
-)";
-
-/// Ten seconds of a wire.
-void write_recording(const std::string& path) {
-  rr::TypeRegistry types;
-  REQUIRE(types.add({definition}, rr::RobdefMode::strict));
-  RecordedService service;
-  service.label = service.service = "Robot";
-  service.url = "rr+tcp://h:1/?service=Robot";
-  service.type = "com.x.Robot";
-  service.node.name = "my.robot";
-  service.definitions = {definition};
-  service.objects = {{"Robot", "com.x.Robot"}};
-  auto writer = RecordingWriter::create(path).value();
-  REQUIRE(writer.add_service(service));
-  const auto& count = *types.find_entity("com.x.Robot")->find_member("count");
-  const auto channel = writer.add_member(service, "Robot", "", count, rr::named_type_schemas(types)).value();
-  for (int i = 0; i <= 10; ++i) REQUIRE(writer.write(channel, {{"value", i}}, rr::TimeSpec{100 + i, 0}, {100 + i, 0}));
-  REQUIRE(writer.close());
-}
 
 struct Played {
   boost::asio::io_context io{1};
@@ -60,7 +33,7 @@ struct Played {
   }
   std::string write(int number) {
     const auto file = "arm.Robot.2026112" + std::to_string(number) + "T083000123Z.mcap";
-    write_recording(folder.path(file));
+    test::write_recording(folder.path(file));
     return file;
   }
   /// What becomes of it; nullopt: nothing yet.
@@ -150,6 +123,7 @@ TEST_CASE("replays: a file that can't be played says why, and is no device") {
   CHECK(refused.error().message.find("is no MCAP file") != std::string::npos);
   const auto missing = made.play("arm.Robot.20261122T083000123Z.mcap");
   REQUIRE_FALSE(missing);
+  CHECK(missing.error().code == rr::ErrorCode::resource_not_found);
   CHECK(missing.error().message.find("No such file") != std::string::npos);
   CHECK(made.devices.all().empty());
   CHECK(made.replays->list().empty());

@@ -1,0 +1,50 @@
+// What the gateway answers to those who play recordings.
+#include <catch2/catch.hpp>
+
+#include "test/server/support/recorded_robot.hpp"
+#include "test/server/support/test_gateway.hpp"
+#include "test/support/folder.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+
+namespace {
+
+const std::string file = "arm.Robot.20261121T083000123Z.mcap";
+const std::string play = "POST /api/v1/recordings/" + file + "/play";
+
+struct Site {
+  Folder folder;
+  TestGateway gateway;
+
+  explicit Site(std::size_t memory = 64'000'000)
+      : gateway(0, [&](Config& config) {
+          config.recordings.folder = folder.path("");
+          config.limits.memory = memory;
+        }) {}
+  TestClient::HttpResponse ask(const std::string& first) const {
+    TestClient client(gateway.port());
+    client.send(first + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+    return client.receive_response();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a recording that takes more memory than is left is refused as limits.memory says, and counted so") {
+  const Site site(1'000'000);
+  write_recording(site.folder.path(file), 300'000);
+  const auto refused = site.ask(play);
+  CHECK(refused.status == 503);
+  CHECK_THAT(refused.head, Catch::Contains("Retry-After: 60\r\n"));
+  CHECK_THAT(refused.body, Catch::Contains("the gateway has no memory left to play"));
+  CHECK_THAT(site.ask("GET /metrics").body, Catch::Contains("rrgate_rejected_total{reason=\"memory\"} 1\n"));
+}
+
+TEST_CASE("a recording that is damaged is refused as it is now") {
+  const Site site;
+  site.folder.write(file, "no MCAP");
+  const auto refused = site.ask(play);
+  CHECK(refused.status == 409);
+  CHECK_THAT(refused.body, Catch::Contains("is no MCAP file"));
+}
