@@ -54,11 +54,13 @@ constexpr std::array recorded_kinds{rr::MemberKind::wire, rr::MemberKind::pipe, 
 
 }  // namespace
 
-rr::Result<Recording> Recording::open(const std::string& path) {
+rr::Result<Recording> Recording::open(const std::string& path, const std::stop_token& unwanted) {
   auto reader = McapReader::open(path);
   if (!reader) return reader.error();
   Recording out(std::move(*reader));
   for (;;) {
+    if (unwanted.stop_requested())
+      return rr::make_error(rr::ErrorCode::operation_cancelled, path + ": is not wanted any more");
     auto record = out.reader_.next();
     if (!record) return record.error();
     if (!*record) break;

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -35,8 +36,9 @@ struct RecordedChunk {
 
 class Recording {
  public:
-  /// Reads all of the file once. Errors   those of McapReader; data_serialization_error: it is no recording of rrgate.
-  static rr::Result<Recording> open(const std::string& path);
+  /// Reads all of the file once. `unwanted`  asked at each record.
+  /// Errors   those of McapReader; data_serialization_error: it is no recording of rrgate; operation_cancelled.
+  static rr::Result<Recording> open(const std::string& path, const std::stop_token& unwanted = {});
 
   const std::vector<RecordedService>& services() const { return services_; }
   const std::map<std::uint16_t, RecordedMember>& members() const { return members_; }

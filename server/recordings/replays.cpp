@@ -8,6 +8,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <thread>
 #include <utility>
 
@@ -40,6 +41,7 @@ struct Replays::Run {
   std::string name;  ///< of the device
   std::string folder;
   std::string path;
+  std::stop_source unwanted;  ///< for what opens it
   asio::io_context io{1};
   asio::steady_timer file_watch;
   std::thread thread;
@@ -47,6 +49,12 @@ struct Replays::Run {
   std::optional<rr::Result<>> outcome;   ///< of opening it
   std::shared_ptr<const Device> device;  ///< null: not yet
   MemoryBudget::Charge memory;
+
+  /// Its thread ends soon, whatever it does.
+  void give_up() {
+    unwanted.request_stop();
+    io.stop();
+  }
 
   rr::Result<std::unique_ptr<Replay>> open(std::size_t& bytes);
   void play(Replay& replay);
@@ -62,7 +70,7 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
     log(LogLevel::warning, "recording is played with gaps", {{"device", device}, {"error", problem}});
   };
   try {
-    auto recording = Recording::open(path);
+    auto recording = Recording::open(path, unwanted.get_token());
     if (!recording) return recording.error();
     bytes = recording->memory();
     return std::make_unique<Replay>(io, std::move(*recording), std::move(how));
@@ -101,7 +109,7 @@ Replays::Replays(const asio::any_io_executor& executor, DeviceRegistry& devices,
 
 Replays::~Replays() {
   for (const auto& [name, run] : runs_) ending_.push_back(run);
-  for (const auto& run : ending_) run->io.stop();
+  for (const auto& run : ending_) run->give_up();
   for (const auto& run : ending_) run->thread.join();
 }
 
@@ -127,9 +135,12 @@ rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) 
   auto found = runs_.find(name);
   if (found == runs_.end()) {
     if (is_stopped_) co_return replay_ended();
-    if (std::max(runs_.size(), ending_.size()) >= most)
+    if (runs_.size() >= most)
       co_return rr::make_error(rr::ErrorCode::invalid_state,
                                "as many recordings are played as may be (" + std::to_string(most) + ")");
+    if (ending_.size() >= most)
+      co_return rr::make_error(rr::ErrorCode::member_busy,
+                               "as many recordings as may be played (" + std::to_string(most) + ") are still ending");
     const auto run = std::make_shared<Run>(executor_, memory_.sibling());
     run->name = name;
     run->folder = folder;
@@ -174,7 +185,7 @@ void Replays::end(Runs::iterator at, const rr::Error& why) {
   const auto run = at->second;
   runs_.erase(at);
   ending_.push_back(run);
-  run->io.stop();
+  run->give_up();
   if (!run->outcome) run->outcome = why;
   run->known.cancel();
   if (!run->device) return;

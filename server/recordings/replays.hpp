@@ -22,15 +22,15 @@ class Replays {
 
   /// `devices`  outlives it. `memory`  see ValueClient.
   Replays(const boost::asio::any_io_executor& executor, DeviceRegistry& devices, MemoryBudget::Charge memory);
-  /// Waits for the threads, which a file that is being opened holds up until it is read.
+  /// Waits for the threads.
   ~Replays();
   Replays(const Replays&) = delete;
   Replays& operator=(const Replays&) = delete;
 
   /// Returns once the file is a device, by replay_of_file(). One that is played already goes on.
-  /// Errors   invalid_state: so many are played already; resource_not_found: there is no such file;
-  /// data_serialization_error, system_resource_error: a file that can't be played; out_of_system_resource: it takes
-  /// more memory than is left; operation_cancelled: it was ended before it began.
+  /// Errors   invalid_state: so many are played already; member_busy: so many are still ending; resource_not_found:
+  /// there is no such file; data_serialization_error, system_resource_error: a file that can't be played;
+  /// out_of_system_resource: it takes more memory than is left; operation_cancelled: it was ended before it began.
   rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
   /// Of a device that plays a recording. Its clients hear that its services end.
   void end(std::string_view device);

@@ -1,5 +1,7 @@
 // What the gateway answers to those who play recordings.
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <future>
 
 #include "test/server/support/recorded_robot.hpp"
 #include "test/server/support/test_gateway.hpp"
@@ -47,4 +49,15 @@ TEST_CASE("a recording that is damaged is refused as it is now") {
   const auto refused = site.ask(play);
   CHECK(refused.status == 409);
   CHECK_THAT(refused.body, Catch::Contains("is no MCAP file"));
+}
+
+TEST_CASE("a recording that is still read is ended by those who may, and who has asked for it hears so") {
+  const Site site;
+  write_endless_recording(site.folder.path(file));
+  auto playing = std::async(std::launch::async, [&] { return site.ask(play); });
+  while (playing.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    CHECK(site.ask("DELETE /api/v1/recordings/" + file + "/play").status == 204);
+  const auto ended = playing.get();
+  CHECK(ended.status == 409);
+  CHECK_THAT(ended.body, Catch::Contains("the recording is not to be played any more"));
 }

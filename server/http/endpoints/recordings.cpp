@@ -246,6 +246,7 @@ std::string names_of_replays(GatewayState& gateway, const Identity& who) {
 Response refuse_to_play(GatewayState& gateway, const rr::Error& why) {
   switch (why.code) {
     case rr::ErrorCode::data_serialization_error:  // the file's fault, not that of who asks
+    case rr::ErrorCode::member_busy:
     case rr::ErrorCode::operation_cancelled:
       return problem_response(409, why.message);
     case rr::ErrorCode::out_of_system_resource: {

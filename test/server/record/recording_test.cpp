@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <stop_token>
 
 #include "server/json/schema.hpp"
 #include "server/record/recording.hpp"
@@ -309,6 +310,21 @@ TEST_CASE("files of former runs count among those that are kept, and go when the
   CHECK(recorded_ring(folder.path("4.mcap")).empty());
   CHECK(writer.drop_oldest());
   CHECK(!std::filesystem::exists(folder.path("3.mcap")));
+}
+
+TEST_CASE("a recording that is not wanted any more is read no further") {
+  const test::Folder folder;
+  Recorded robot;
+  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  REQUIRE(writer.close());
+  std::stop_source unwanted;
+  CHECK(Recording::open(writer.path(), unwanted.get_token()).has_value());
+  unwanted.request_stop();
+  const auto given_up = Recording::open(writer.path(), unwanted.get_token());
+  REQUIRE_FALSE(given_up.has_value());
+  CHECK(given_up.error().code == rr::ErrorCode::operation_cancelled);
 }
 
 TEST_CASE("what is no recording says so") {

@@ -1,6 +1,7 @@
 // Recordings that are played as devices: which there are, how many, and what ends them.
 #include "server/recordings/replays.hpp"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
@@ -31,10 +32,14 @@ struct Played {
     io.restart();
     io.run_for(std::chrono::milliseconds(50));
   }
+  static std::string name_of(int number) { return "arm.Robot.2026112" + std::to_string(number) + "T083000123Z.mcap"; }
   std::string write(int number) {
-    const auto file = "arm.Robot.2026112" + std::to_string(number) + "T083000123Z.mcap";
-    test::write_recording(folder.path(file));
-    return file;
+    test::write_recording(folder.path(name_of(number)));
+    return name_of(number);
+  }
+  std::string write_endless(int number) {
+    test::write_endless_recording(folder.path(name_of(number)));
+    return name_of(number);
   }
   /// What becomes of it; nullopt: nothing yet.
   std::shared_ptr<std::optional<rr::Result<>>> begin(const std::string& file) {
@@ -97,6 +102,43 @@ TEST_CASE("replays: there are four at a time, and who has ended one begins anoth
   CHECK(refused.error().message == "as many recordings are played as may be (4)");
   made.replays->end(made.replays->list().front());
   CHECK(made.play(fifth));
+}
+
+TEST_CASE("replays: those whose files are still read when they end go at once, and leave room for others") {
+  Played made;
+  std::vector<std::shared_ptr<std::optional<rr::Result<>>>> outcomes;
+  for (int i = 1; i <= 4; ++i) outcomes.push_back(made.begin(made.write_endless(i)));
+  REQUIRE(made.until([&] { return made.replays->list().size() == 4; }));
+  const auto fifth = made.write(5);
+  outcomes.push_back(made.begin(fifth));  // before what their threads say
+  for (const auto& name : made.replays->list()) made.replays->end(name);
+  CHECK(made.replays->list().empty());
+  const auto has_all = [&] {
+    return std::all_of(outcomes.begin(), outcomes.end(), [](const auto& each) { return each->has_value(); });
+  };
+  REQUIRE(made.until(has_all));
+  for (int i = 0; i < 4; ++i) {
+    const auto& ended = **outcomes[static_cast<std::size_t>(i)];
+    REQUIRE_FALSE(ended);
+    CHECK(ended.error().code == rr::ErrorCode::operation_cancelled);
+  }
+  const auto& refused = **outcomes.back();
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == rr::ErrorCode::member_busy);
+  CHECK(refused.error().message == "as many recordings as may be played (4) are still ending");
+  CHECK(made.until([&] { return made.play(fifth).has_value(); }));
+}
+
+TEST_CASE("replays: a file that is still read holds up nobody who stops") {
+  Played made;
+  const auto outcome = made.begin(made.write_endless(1));
+  REQUIRE(made.until([&] { return !made.replays->list().empty(); }));
+  made.replays->stop();
+  made.replays.reset();  // waits for its thread
+  REQUIRE(made.until([&] { return outcome->has_value(); }));
+  const auto& ended = **outcome;
+  REQUIRE_FALSE(ended);
+  CHECK(ended.error().code == rr::ErrorCode::operation_cancelled);
 }
 
 TEST_CASE("replays: one whose file has gone, or whose folder is none any more, ends") {

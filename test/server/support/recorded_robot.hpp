@@ -2,9 +2,13 @@
 #pragma once
 
 #include <catch2/catch.hpp>
+#include <cstdint>
+#include <filesystem>
 #include <string>
 
+#include "node/platform/text_file.hpp"
 #include "server/json/schema.hpp"
+#include "server/record/mcap.hpp"
 #include "server/record/recording_writer.hpp"
 
 namespace rrgate::test {
@@ -32,6 +36,12 @@ inline void write_recording(const std::string& path, std::size_t filling = 0) {
     REQUIRE(writer.write(channel, message, rr::TimeSpec{100 + i, 0}, {100 + i, 0}).has_value());
   }
   REQUIRE(writer.close().has_value());
+}
+
+/// One that takes hours to read: it is all records without content, and takes no room on the disk.
+inline void write_endless_recording(const std::string& path) {
+  REQUIRE(write_text_file(path, mcap_magic));
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 36);
 }
 
 }  // namespace rrgate::test
