@@ -46,7 +46,7 @@ class MemoryBudget {
 
   explicit MemoryBudget(std::size_t total);
 
-  /// Of nothing yet. `client`  by its network; empty: the gateway itself.
+  /// Of nothing yet. `client`  by its network; empty: the gateway itself; "recordings": what plays those.
   Charge charge(const std::string& client);
 
   void set_total(std::size_t total);

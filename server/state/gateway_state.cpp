@@ -20,8 +20,8 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
                    : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.clients)),
       devices_(io.get_executor(), config_),
       clients_(io.get_executor(), memory_.charge("")),
-      recordings_(
-          std::make_unique<Recordings>(io.get_executor(), config_, devices_, clients_, workers_, memory_.charge(""))),
+      recordings_(std::make_unique<Recordings>(io.get_executor(), config_, devices_, clients_, workers_,
+                                               memory_.charge("recordings"))),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_, logins_) {}
 

@@ -43,6 +43,21 @@ TEST_CASE("a recording that takes more memory than is left is refused as limits.
   CHECK_THAT(site.ask("GET /metrics").body, Catch::Contains("rrgate_rejected_total{reason=\"memory\"} 1\n"));
 }
 
+TEST_CASE("recordings that are played take nothing from what the gateway may hold of devices") {
+  Site site;
+  write_recording(site.folder.path(file));
+  REQUIRE(site.ask(play).status == 201);
+  std::size_t held = 0;
+  bool has_share = false;
+  site.gateway.visit([&](Gateway& gateway) {
+    auto& memory = gateway.memory();
+    held = memory.used();
+    has_share = memory.charge("").resize((memory.total() - held) / 2);
+  });
+  CHECK(held > 0);
+  CHECK(has_share);
+}
+
 TEST_CASE("a recording that is damaged is refused as it is now") {
   const Site site;
   site.folder.write(file, "no MCAP");

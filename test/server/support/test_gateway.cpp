@@ -94,6 +94,15 @@ void TestGateway::reconfigure(const std::function<void(Config&)>& change) {
   done.get_future().get().value();
 }
 
+void TestGateway::visit(const std::function<void(Gateway&)>& look) {
+  std::promise<void> done;
+  asio::post(io_, [&] {
+    look(*gateway_);
+    done.set_value();
+  });
+  done.get_future().wait();
+}
+
 std::string TestGateway::wait_for_state(std::string_view state, std::size_t index) {
   return wait_for_device(index, [&](const auto& device) { return device["state"] == std::string(state); }).dump();
 }

@@ -36,6 +36,8 @@ class TestGateway {
   void withdraw(const rr::NodeId& node_id, const std::string& url);
   /// Gateway::reconfigure, with the present configuration and what `change` makes of it.
   void reconfigure(const std::function<void(Config&)>& change);
+  /// Calls `look` on the gateway's thread, and waits for it.
+  void visit(const std::function<void(Gateway&)>& look);
   /// Asks `path` until the answer is as wanted; returns it. Throws after 10 s.
   nlohmann::json wait_for(const std::string& path, const std::function<bool(const nlohmann::json&)>& is_wanted);
 
