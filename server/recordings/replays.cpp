@@ -202,6 +202,11 @@ void Replays::note_end(Run& run) {
   ending_.erase(ending);
 }
 
+bool Replays::is_playing(std::string_view device) const {
+  const auto found = runs_.find(device);
+  return found != runs_.end() && found->second->device;
+}
+
 std::vector<std::string> Replays::list() const {
   std::vector<std::string> out;
   for (const auto& [name, run] : runs_) out.push_back(name);

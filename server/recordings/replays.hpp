@@ -34,8 +34,9 @@ class Replays {
   rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
   /// Of a device that plays a recording. Its clients hear that its services end.
   void end(std::string_view device);
-  bool is_playing(std::string_view device) const { return runs_.contains(device); }
-  /// The devices.
+  /// Whether it is a device: not while its file is still read.
+  bool is_playing(std::string_view device) const;
+  /// The devices, and what will be some.
   std::vector<std::string> list() const;
   /// Ends those of other folders.
   void keep_folder(const std::string& folder);

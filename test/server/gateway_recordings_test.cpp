@@ -2,7 +2,9 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <future>
+#include <nlohmann/json.hpp>
 
+#include "server/recordings/recordings.hpp"
 #include "test/server/support/recorded_robot.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
@@ -12,7 +14,8 @@ using namespace rrgate::test;
 
 namespace {
 
-const std::string file = "arm.Robot.20261121T083000123Z.mcap";
+const std::string name = "arm.Robot.20261121T083000123Z";
+const std::string file = name + ".mcap";
 const std::string play = "POST /api/v1/recordings/" + file + "/play";
 
 struct Site {
@@ -75,4 +78,19 @@ TEST_CASE("a recording that is still read is ended by those who may, and who has
   const auto ended = playing.get();
   CHECK(ended.status == 409);
   CHECK_THAT(ended.body, Catch::Contains("the recording is not to be played any more"));
+}
+
+TEST_CASE("a recording that is still read has no device yet") {
+  Site site;
+  write_endless_recording(site.folder.path(file));
+  auto playing = std::async(std::launch::async, [&] { return site.ask(play); });
+  const auto is_over = [&] { return playing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; };
+  bool is_read = false;
+  while (!is_read && !is_over())
+    site.gateway.visit([&](Gateway& gateway) { is_read = !gateway.recordings().replays().list().empty(); });
+  REQUIRE(is_read);
+  const auto told = nlohmann::json::parse(site.ask("GET /api/v1/recordings/" + name).body);
+  CHECK(told.at("files").at(0).at("replay").is_null());
+  CHECK(site.ask("DELETE /api/v1/recordings/" + name + "/play").status == 204);
+  CHECK(playing.get().status == 409);
 }

@@ -73,6 +73,26 @@ test("a recording is played, shown and ended, unless four are played already", a
   expect(button("Play part 5").title).toBe("4 recordings are played already; stop one of them first");
 });
 
+test("a recording whose playing has not begun yet is not played again", async () => {
+  const file = { name: "r1.mcap", bytes: 1, replay: "" };
+  let begun = (): void => undefined;
+  const desk = {
+    state: new Store({ enabled: true, bytes: 10, maxBytes: 100, list: [{ ...recording, files: [file] }] }),
+    trouble: new Store(null),
+    start: () => undefined,
+    stop: () => undefined,
+    play: vi.fn(() => new Promise<void>((resolve) => (begun = resolve))),
+  };
+  show(RecordingsPage, { desk, list: { state: new Store({ kind: "loading" }) } } as never);
+  await settle();
+  await press("Play");
+  expect(button("Play").disabled).toBe(true);
+  begun();
+  await settle();
+  expect(button("Play").disabled).toBe(false);
+  expect(desk.play).toHaveBeenCalledTimes(1);
+});
+
 test("a replay is not offered for recording", async () => {
   const devices = ["arm", "replay~arm.robot.20261125T083000123Z"].map((name) => ({
     name,

@@ -179,11 +179,25 @@ TEST_CASE("replays: one that takes more memory than is left is refused") {
   CHECK(made.devices.all().empty());
 }
 
+TEST_CASE("replays: one whose file is still read is not played yet, but is one of those that can be ended") {
+  Played made;
+  const auto file = made.write_endless(1);
+  const auto name = replay_of_file(file);
+  const auto outcome = made.begin(file);
+  REQUIRE(made.until([&] { return made.replays->list() == std::vector<std::string>{name}; }));
+  CHECK_FALSE(made.replays->is_playing(name));
+  const auto other = made.write(2);
+  REQUIRE(made.play(other));
+  CHECK(made.replays->is_playing(replay_of_file(other)));
+  made.replays->end(name);
+  CHECK(made.replays->list() == std::vector<std::string>{replay_of_file(other)});
+}
+
 TEST_CASE("replays: who waits for one to begin hears of its end, and of that of the gateway") {
   Played made;
   const auto file = made.write(1);
   const auto outcome = made.begin(file);
-  REQUIRE(made.until([&] { return made.replays->is_playing(replay_of_file(file)); }));
+  REQUIRE(made.until([&] { return !made.replays->list().empty(); }));
   made.replays->stop();
   REQUIRE(made.until([&] { return outcome->has_value(); }));
   const auto late = made.play(file);

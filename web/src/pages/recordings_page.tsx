@@ -193,14 +193,20 @@ interface PlayButtonsProps {
 }
 
 function PlayButtons({ file, part, service, desk, mayPlay }: PlayButtonsProps) {
+  const [isBeginning, setBeginning] = useState(false);
+  const play = async (): Promise<void> => {
+    setBeginning(true);
+    await desk.play(file);
+    setBeginning(false);
+  };
   if (file.replay === "")
     return (
       <button
         class="button"
         type="button"
-        disabled={!mayPlay}
+        disabled={!mayPlay || isBeginning}
         title={mayPlay ? undefined : t("{0} recordings are played already; stop one of them first", MOST_REPLAYS)}
-        onClick={() => void desk.play(file)}
+        onClick={() => void play()}
       >
         {part === null ? t("Play") : t("Play part {0}", part)}
       </button>
