@@ -113,13 +113,13 @@ Replays::~Replays() {
   for (const auto& run : ending_) run->thread.join();
 }
 
-void Replays::begin(Run& run) {
+rr::Result<> Replays::begin(Run& run) {
   const auto tell = [this, life = std::weak_ptr(life_)](auto news) {
     asio::post(executor_, [life, news = std::move(news)] {
       if (!life.expired()) news();
     });
   };
-  run.thread = std::thread([this, &run, tell] {
+  const auto work = [this, &run, tell] {
     std::size_t bytes = 0;
     auto replay = run.open(bytes);
     const auto url = replay ? rr::parse_url((*replay)->urls().front()) : rr::Result<rr::ConnectionUrl>(replay.error());
@@ -127,7 +127,14 @@ void Replays::begin(Run& run) {
     if (replay) run.play(**replay);
     if (replay) replay->reset();  // before its io_context
     tell([this, &run] { note_end(run); });
-  });
+  };
+  try {
+    run.thread = std::thread(work);
+  } catch (const std::exception& failure) {
+    return rr::make_error(rr::ErrorCode::system_resource_error,
+                          "there is no thread to play " + run.path + ": " + failure.what());
+  }
+  return {};
 }
 
 rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) {
@@ -146,11 +153,9 @@ rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) 
     run->folder = folder;
     run->path = (fs::path(folder) / file).string();
     found = runs_.emplace(name, run).first;
-    try {
-      begin(*run);
-    } catch (...) {  // no thread
+    if (const auto begun = begin(*run); !begun) {
       runs_.erase(found);
-      throw;
+      co_return begun.error();
     }
   }
   const auto run = found->second;

@@ -29,7 +29,7 @@ class Replays {
 
   /// Returns once the file is a device, by replay_of_file(). One that is played already goes on.
   /// Errors   invalid_state: so many are played already; member_busy: so many are still ending; resource_not_found:
-  /// there is no such file; data_serialization_error, system_resource_error: a file that can't be played;
+  /// there is no such file; data_serialization_error, system_resource_error: a file that can't be played, or no thread;
   /// out_of_system_resource: it takes more memory than is left; operation_cancelled: it was ended before it began.
   rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
   /// Of a device that plays a recording. Its clients hear that its services end.
@@ -48,7 +48,8 @@ class Replays {
   using RunPtr = std::shared_ptr<Run>;
   using Runs = std::map<std::string, RunPtr, std::less<>>;
 
-  void begin(Run& run);
+  /// Errors   system_resource_error: there is no thread.
+  rr::Result<> begin(Run& run);
   void note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size_t bytes);
   void note_end(Run& run);
   void end(Runs::iterator at, const rr::Error& why);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/recordings/recordings.hpp"
+#include "test/server/support/no_threads.hpp"
 #include "test/server/support/recorded_robot.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
@@ -44,6 +45,18 @@ TEST_CASE("a recording that takes more memory than is left is refused as limits.
   CHECK_THAT(refused.head, Catch::Contains("Retry-After: 60\r\n"));
   CHECK_THAT(refused.body, Catch::Contains("the gateway has no memory left to play"));
   CHECK_THAT(site.ask("GET /metrics").body, Catch::Contains("rrgate_rejected_total{reason=\"memory\"} 1\n"));
+}
+
+TEST_CASE("a recording for which there is no thread is refused with 500, which says so") {
+  const Site site;
+  write_recording(site.folder.path(file));
+  {
+    const NoThreads none;
+    const auto refused = site.ask(play);
+    CHECK(refused.status == 500);
+    CHECK_THAT(refused.body, Catch::Contains("there is no thread to play "));
+  }
+  CHECK(site.ask(play).status == 201);
 }
 
 TEST_CASE("recordings that are played take nothing from what the gateway may hold of devices") {

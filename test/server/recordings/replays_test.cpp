@@ -9,6 +9,7 @@
 
 #include "core/session/service/service_index.hpp"
 #include "server/recordings/recording_files.hpp"
+#include "test/server/support/no_threads.hpp"
 #include "test/server/support/recorded_robot.hpp"
 #include "test/support/folder.hpp"
 #include "test/support/print.hpp"
@@ -177,6 +178,20 @@ TEST_CASE("replays: one that takes more memory than is left is refused") {
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
   CHECK(made.devices.all().empty());
+}
+
+TEST_CASE("replays: one for which there is no thread is refused, and can be played when there is one") {
+  Played made;
+  const auto file = made.write(1);
+  {
+    const test::NoThreads none;
+    const auto refused = made.play(file);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().code == rr::ErrorCode::system_resource_error);
+    CHECK(refused.error().message.find("there is no thread to play ") != std::string::npos);
+  }
+  CHECK(made.replays->list().empty());
+  CHECK(made.play(file));
 }
 
 TEST_CASE("replays: one whose file is still read is not played yet, but is one of those that can be ended") {
