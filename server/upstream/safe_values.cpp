@@ -1,6 +1,7 @@
 #include "server/upstream/safe_values.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/session/service_path.hpp"
 #include "server/json/value_from_json.hpp"
@@ -55,6 +56,23 @@ rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDe
   return out;
 }
 
+/// What has become of all that was sent at once.
+class Answers {
+ public:
+  explicit Answers(SafeValues::Answered all) : all_(std::move(all)) {}
+
+  void expect_one() { ++open_; }
+  void add(const rr::Result<>& answer) {
+    if (result_ && !answer) result_ = answer;
+    if (--open_ == 0 && all_) all_(result_);
+  }
+
+ private:
+  SafeValues::Answered all_;
+  std::size_t open_ = 0;
+  rr::Result<> result_;
+};
+
 }  // namespace
 
 SafeValues::SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions)
@@ -70,11 +88,15 @@ SafeValues::~SafeValues() {
   for (const auto& path : owed_)
     log(LogLevel::warning, "the device was not made safe: it was away, and the gateway stops or leaves it",
         {{"device", device_}, {"path", path}});
+  for (const auto& path : refused_)
+    log(LogLevel::warning, "the device was not made safe: it is locked, and the gateway stops or leaves it",
+        {{"device", device_}, {"path", path}});
 }
 
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
   for (auto& item : items_) item.is_checked = false;
   handle_lost(upstream->number());  // its session before this one may have been closed while it rested
+  handle_unlocked();                // what the device has kept for a lost session this one may give back
   for (std::size_t i = 0; i < items_.size(); ++i) look_up(i, upstream);
   pay(upstream);
 }
@@ -149,9 +171,11 @@ void SafeValues::pay_due(const std::shared_ptr<Upstream>& upstream,
   std::copy_if(owed_.begin(), owed_.end(), std::back_inserter(due), is_due);
   std::erase_if(owed_, is_due);
   for (const auto& path : due)
-    if (send(path, upstream))
-      log(LogLevel::warning, "the device is back, and was made safe: a lease had ended while it was away",
-          {{"device", device_}, {"path", path}});
+    send(path, upstream, [device = device_, path](const rr::Result<>& answer) {
+      if (answer)
+        log(LogLevel::warning, "the device is back, and was made safe: a lease had ended while it was away",
+            {{"device", device}, {"path", path}});
+    });
 }
 
 void SafeValues::handle_lost(std::uint64_t upstream) {
@@ -162,34 +186,53 @@ void SafeValues::handle_lost(std::uint64_t upstream) {
   for (const auto& path : lost) owe_again(path);
 }
 
-void SafeValues::owe_again(const std::string& path) {
-  if (!is_leased_ || !is_leased_(path)) send(path, nullptr);
+void SafeValues::handle_unlocked() {
+  for (const auto& path : std::exchange(refused_, {})) owe_again(path);
 }
 
-bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by) {
+void SafeValues::owe_again(const std::string& path) {
+  if (!links_.is_leased(path)) send(path, nullptr);
+}
+
+bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered) {
   if (!by || by->is_lost()) {
     if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
-    if (on_owed_) on_owed_();
+    links_.owed();
+    if (answered)
+      answered(rr::make_error(rr::ErrorCode::connection_error, "the device is away; it is made safe when it is back"));
     return false;
   }
   by->forget_commands(path);
   std::erase_if(doubts_, [&](const Doubt& doubt) { return rr::is_within(doubt.path, path); });
+  std::erase_if(refused_, [&](const std::string& refused) { return rr::is_within(refused, path); });
+  const auto answers = std::make_shared<Answers>(std::move(answered));
+  answers->expect_one();  // the end of this
   for (const auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.last) continue;
-    by->make_safe(*item.last, [weak = weak_from_this(), by, action = item.action](const rr::Result<rr::Value>& result) {
+    const auto holder = links_.find_session(item.action.path);
+    const auto& sender = holder ? holder : by;
+    answers->expect_one();
+    sender->make_safe(*item.last, [weak = weak_from_this(), sender, answers,
+                                   action = item.action](const rr::Result<rr::Value>& result) {
       const auto self = weak.lock();
-      if (result || !self) return;
-      log(LogLevel::error, "the device did not take a safe value",
-          {{"device", self->device_},
-           {"member", action.path + "." + action.member},
-           {"error", result.error().message}});
-      if (by->is_lost()) return self->owe_again(action.path);
-      const auto code = result.error().code;  // connection_error: another gateway, before it ends our session, too
-      if (code == rr::ErrorCode::request_timeout || code == rr::ErrorCode::connection_error)
-        self->doubts_.push_back({action.path, by->number()});
+      if (!result && self) self->handle_failed(action, *sender, result.error());
+      answers->add(result ? rr::Result<>() : rr::Result<>(result.error()));
     });
   }
+  answers->add({});
   return !by->is_lost();
+}
+
+void SafeValues::handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error) {
+  log(LogLevel::error, "the device did not take a safe value",
+      {{"device", device_}, {"member", action.path + "." + action.member}, {"error", error.message}});
+  if (by.is_lost()) return owe_again(action.path);
+  // connection_error: another gateway, before it ends our session, too
+  if (error.code == rr::ErrorCode::request_timeout || error.code == rr::ErrorCode::connection_error)
+    doubts_.push_back({action.path, by.number()});
+  if (error.code != rr::ErrorCode::object_locked_error) return;
+  refused_.push_back(action.path);
+  links_.locked(action.path);
 }
 
 }  // namespace rrgate

@@ -24,9 +24,26 @@ struct SafeRequest {
   std::vector<rr::Value> values;  ///< a call's arguments; else one
 };
 
+/// What SafeValues asks, and tells, whoever has the sessions, locks and leases of the service.
+struct SafeLinks {
+  /// Some could not be sent now.
+  std::function<void()> owed = [] {};
+  /// Whether somebody has a lease of an object: what was sent before and has not arrived is not sent again then, as the
+  /// end of that lease makes the object safe.
+  std::function<bool(const std::string& path)> is_leased = [](const std::string&) { return false; };
+  /// The session that the device lets use an object, because of a lock; null: any.
+  std::function<std::shared_ptr<Upstream>(const std::string& path)> find_session = [](const std::string&) {
+    return nullptr;
+  };
+  /// The device refuses an object because of a lock: handle_unlocked() follows where that can be given back.
+  std::function<void(const std::string& path)> locked = [](const std::string&) {};
+};
+
 /// Lives in a shared_ptr, which its requests that are under way do not keep.
 class SafeValues : public std::enable_shared_from_this<SafeValues> {
  public:
+  using Answered = std::function<void(const rr::Result<>&)>;
+
   /// Those of `actions` that are about the service.
   SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions);
   /// What is owed still is given up, and logged.
@@ -43,23 +60,23 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   rr::Result<> check(std::string_view path) const;
   /// Whether there are any at or below a path.
   bool has(std::string_view path) const;
-  /// Whether some could not be sent yet.
-  bool is_owing() const { return !owed_.empty(); }
-  /// Some could not be sent now. `is_leased`  whether somebody has a lease of an object: what was sent before and has
-  /// not arrived is not sent again then, as the end of that lease makes the object safe.
-  void on_owed(std::function<void()> handler, std::function<bool(const std::string& path)> is_leased) {
-    on_owed_ = std::move(handler);
-    is_leased_ = std::move(is_leased);
-  }
+  /// Whether some could not be sent yet, or were refused because of a lock.
+  bool is_owing() const { return !owed_.empty() || !refused_.empty(); }
+  void link(SafeLinks links) { links_ = std::move(links); }
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
-  /// they are sent as soon as there is one. So are those that a session which is lost later has not answered.
-  bool send(const std::string& path, const std::shared_ptr<Upstream>& by);
+  /// they are sent as soon as there is one. So are those that a session which is lost later has not answered, and those
+  /// that the device refuses because of a lock as soon as one may be gone.
+  /// `by`  the session where the device does not want another, see SafeLinks::find_session.
+  /// `answered`  called once, when all are answered: the first error; connection_error: they could not be sent.
+  bool send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered = nullptr);
   /// Sends what could not be sent before, where it has been held against what the device is now.
   void pay(const std::shared_ptr<Upstream>& upstream);
   /// The same for what is owed at, above and below a path, at once: somebody is about to command there.
   void pay_around(std::string_view path, const std::shared_ptr<Upstream>& upstream);
-  /// The upstream has lost its session with the device.
+  /// The session of the upstream with the device has ended.
   void handle_lost(std::uint64_t upstream);
+  /// A lock at the device was given back.
+  void handle_unlocked();
 
  private:
   struct Item {
@@ -81,13 +98,14 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   bool is_checked(std::string_view path) const;
   void pay_due(const std::shared_ptr<Upstream>& upstream, const std::function<bool(const std::string&)>& is_due);
   void owe_again(const std::string& path);
+  void handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error);
 
   std::string device_;
   std::vector<Item> items_;
   std::vector<std::string> owed_;  ///< paths of leases that have ended while there was no session
   std::vector<Doubt> doubts_;
-  std::function<void()> on_owed_;
-  std::function<bool(const std::string&)> is_leased_;
+  std::vector<std::string> refused_;  ///< paths of what the device has not taken because of a lock
+  SafeLinks links_;
 };
 
 }  // namespace rrgate

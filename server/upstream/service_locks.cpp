@@ -206,6 +206,18 @@ std::shared_ptr<Upstream> ServiceLocks::open_upstream(const std::shared_ptr<Upst
   return nullptr;
 }
 
+std::shared_ptr<Upstream> ServiceLocks::open_session(std::optional<LockSession> session) {
+  const auto known = session ? upstreams_.find(*session) : upstreams_.end();
+  auto upstream = known == upstreams_.end() ? nullptr : known->second.lock();
+  return upstream && upstream->may_act() ? upstream : nullptr;
+}
+
+void ServiceLocks::give_back_kept(const std::string& path) {
+  if (!open_session(table_.find_kept(path, steady_now()))) return;
+  table_.give_back_kept(path);
+  settle();
+}
+
 rr::Result<> ServiceLocks::make_safe(std::string_view path) {
   const auto key = canonical_lock_path(path);
   if (!device_.config().leases.is_offered || !safe_->has(key))
@@ -226,14 +238,25 @@ void ServiceLocks::end_leases(const std::string& why) {
 void ServiceLocks::handle_opened(const std::shared_ptr<Upstream>& upstream) {
   if (!device_.config().leases.is_offered || !upstream->may_act()) return;
   upstreams_[upstream->number()] = upstream;
-  safe_->on_owed(
-      [weak = weak_from_this()] {
-        if (const auto self = weak.lock()) self->pay_or_wake();
-      },
-      [weak = weak_from_this()](const std::string& path) {
-        const auto self = weak.lock();
-        return self && self->leases_.is_held(path);
-      });
+  const auto weak = weak_from_this();
+  safe_->link({.owed =
+                   [weak] {
+                     if (const auto self = weak.lock()) self->pay_or_wake();
+                   },
+               .is_leased =
+                   [weak](const std::string& path) {
+                     const auto self = weak.lock();
+                     return self && self->leases_.is_held(path);
+                   },
+               .find_session =
+                   [weak](const std::string& path) {
+                     const auto self = weak.lock();
+                     return self ? self->open_session(self->table_.session_at(path)) : nullptr;
+                   },
+               .locked =
+                   [weak](const std::string& path) {
+                     if (const auto self = weak.lock()) self->give_back_kept(path);
+                   }});
   safe_->handle_opened(upstream);
 }
 
@@ -287,11 +310,13 @@ void ServiceLocks::settle() {
 }
 
 void ServiceLocks::handle(LockAsked&& asked) {
-  auto answered = [weak = weak_from_this(), id = asked.id](const rr::Result<rr::Value>& result) {
+  auto answered = [weak = weak_from_this(), id = asked.id,
+                   command = asked.command](const rr::Result<rr::Value>& result) {
     const auto self = weak.lock();
     if (!self) return;
     self->table_.handle_answer(id, result ? rr::Result<>() : rr::Result<>(result.error()), steady_now());
     self->settle();
+    if (result && command == rr::LockCommand::unlock) self->safe_->handle_unlocked();
   };
   const auto upstream = upstreams_[asked.session].lock();
   if (!upstream) return answered(rr::make_error(rr::ErrorCode::connection_error, "the session has ended"));

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -64,7 +65,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   /// Errors   not_implemented_error: none are declared; those of SafeValues::check(), where not all could be sent;
   /// connection_error: they are sent as soon as the device is back.
   rr::Result<> make_safe(std::string_view path);
-  /// Whether the device is still to be made safe, because it was away when a lease ended.
+  /// Whether the device is still to be made safe, or may have to be made safe again: see SafeValues::is_owing().
   bool is_owing() const { return safe_->is_owing(); }
   /// Every lease ends, because the gateway or the device goes.
   void end_leases(const std::string& why);
@@ -88,6 +89,10 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void end_leases();
   void pay_or_wake();
   std::shared_ptr<Upstream> open_upstream(const std::shared_ptr<Upstream>& first);
+  /// Null: it is not open, or has none.
+  std::shared_ptr<Upstream> open_session(std::optional<LockSession> session);
+  /// What the device keeps for a session that was lost is unlocked by the one that has followed it.
+  void give_back_kept(const std::string& path);
 
   /// Does what the table wants done.
   void settle();

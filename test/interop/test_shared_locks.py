@@ -287,6 +287,23 @@ def test_a_lock_that_the_device_keeps_for_a_lost_session(site):
         other.speed = 6.0
 
 
+def test_a_lock_that_the_device_keeps_for_a_lost_session_does_not_keep_it_from_being_made_safe(node, tmp_path):
+    leases = {"safe": [{"property": "guarded.speed", "value": 0}]}
+    site = Site(tmp_path, node, {**GATEWAY_LOGIN, "leases": leases})
+    try:
+        with Socket(site.port, "/api/v1/devices/interop/guarded") as page:
+            page.ask("lock", kind="client")
+            page.ask("lease", deadman=60000)
+            page.ask("set", "speed", value=2)
+            arm = site.direct("guarded", "alice")
+            assert is_refused(LOCKED, lambda: arm.speed)
+            site.line.cut()
+            site.gateway.wait_until(lambda: not is_refused(LOCKED, lambda: arm.speed))
+            site.gateway.wait_until(lambda: arm.speed == 0)
+    finally:
+        site.stop()
+
+
 def test_a_lock_of_a_page_keeps_out_everybody(site):
     other = site.connect()
     with Socket(site.port, "/api/v1/devices/interop/guarded") as page, Socket(site.port, "/api/v1/devices/interop/guarded") as second:

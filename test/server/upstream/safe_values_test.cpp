@@ -9,11 +9,47 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// Everybody is who he says, and nobody is nobody.
+/// Everybody is who he says, and may lock; and nobody is nobody.
 class Believing final : public rr::Authenticator {
  public:
   rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt& attempt) const override {
-    return rr::AuthenticatedUser{attempt.username};
+    return rr::AuthenticatedUser{attempt.username, {"objectlock"}};
+  }
+};
+
+/// A device that wants users, the gateway's own session with it, which is that of "gateway", and one of "alice".
+struct Guarded {
+  Counting device;
+  UpstreamBench bench;
+  std::shared_ptr<Upstream> own;
+
+  explicit Guarded(const std::string& safe) : bench(service_with_users(device), leases_with(safe)) {
+    bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{"gateway", {}});
+    bench.open();
+    own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{"alice", {}}, UpstreamUse::one_client);
+    REQUIRE(bench.wait_for(own->open()).has_value());
+  }
+  ~Guarded() { own->close(); }
+  Guarded(const Guarded&) = delete;
+  Guarded& operator=(const Guarded&) = delete;
+
+  void lock(const std::shared_ptr<Upstream>& by, HearingClient& holder, rr::LockCommand command) {
+    REQUIRE(ask_for_lease(bench, by, holder, command) == rr::ErrorCode::none);
+  }
+  /// The device has got a safe value, and refuses it because of a lock.
+  void refuse_locked() {
+    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+    std::exchange(device.waiting, std::nullopt)->fail({rr::ErrorCode::object_locked_error, "Object locked by gateway"});
+  }
+
+ private:
+  static std::shared_ptr<rr::Service> service_with_users(Counting& device) {
+    rr::SecurityPolicy policy;
+    policy.authenticator = std::make_shared<Believing>();
+    policy.require_valid_user = true;
+    policy.allow_object_lock = true;
+    device.service->set_security(policy);
+    return device.service;
   }
 };
 
@@ -276,6 +312,50 @@ TEST_CASE("a safe value that a lost session has not answered is sent by one that
   REQUIRE(bench.run_until([&] { return asked->has_value(); }));  // what was sent before has arrived by then
   CHECK(device.waiting.has_value() == !is_leased);
   own->close();
+}
+
+TEST_CASE("a safe value that is refused because of a lock of a lost session is sent again behind the unlocking") {
+  Guarded made("wait");
+  auto& [device, bench, own] = made;
+  std::optional<HearingClient> holder(std::in_place, bench.upstream);
+  made.lock(bench.upstream, *holder, rr::LockCommand::lock_for_client);
+  take_lease(bench, bench.upstream, *holder);
+  cut(bench, bench.upstream);
+  const bool has_left = GENERATE(false, true);
+  if (has_left) holder.reset();
+  bench.open();
+  made.refuse_locked();
+  CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
+}
+
+TEST_CASE("a safe value that the lock of a user's lost session keeps out is sent by the session that follows") {
+  Guarded made("stop");
+  auto& [device, bench, own] = made;
+  const auto other =  // of the same user: the device does not forget the lock with the first
+      std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{"alice", {}}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(other->open()).has_value());
+  HearingClient holder(own);
+  made.lock(own, holder, rr::LockCommand::lock_for_user);
+  take_lease(bench, own, holder);
+  cut(bench, own);
+  bench.find("bench.others[1]");  // behind the answer to the safe value
+  CHECK(device.commands.empty());
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
+  other->close();
+}
+
+TEST_CASE("a safe value that is refused because of somebody's lock is owed until a session is opened") {
+  Guarded made("wait");
+  auto& [device, bench, own] = made;
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  REQUIRE(ask_for_lease(bench, bench.upstream, holder, rr::LockCommand::release_lease) == rr::ErrorCode::none);
+  made.refuse_locked();
+  bench.find("bench.others[1]");  // behind the refusal
+  cut(bench, own);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
 TEST_CASE("a safe value that fits no more holds up no other that is owed") {
