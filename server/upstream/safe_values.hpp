@@ -60,8 +60,8 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   rr::Result<> check(std::string_view path) const;
   /// Whether there are any at or below a path.
   bool has(std::string_view path) const;
-  /// Whether some could not be sent yet, or were refused because of a lock.
-  bool is_owing() const { return !owed_.empty() || !refused_.empty(); }
+  /// Whether some could not be sent yet, or may have to be sent again.
+  bool is_owing() const { return !owed_.empty() || !doubts_.empty() || !refused_.empty(); }
   void link(SafeLinks links) { links_ = std::move(links); }
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one. So are those that a session which is lost later has not answered, and those

@@ -277,6 +277,10 @@ void ServiceLocks::handle_lost(const Upstream& upstream) {
   settle();
 }
 
+void ServiceLocks::handle_closed(const Upstream& upstream) {
+  safe_->handle_lost(upstream.number());
+}
+
 void ServiceLocks::handle_released(std::string_view path) {
   table_.handle_released(path, steady_now());
   settle();

@@ -72,6 +72,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void handle_opened(const std::shared_ptr<Upstream>& upstream);
   /// The upstream has lost its session with the device.
   void handle_lost(const Upstream& upstream);
+  /// The upstream has ended its session with the device, for good.
+  void handle_closed(const Upstream& upstream);
   /// The device has replaced the objects at and below a path.
   void handle_released(std::string_view path);
   /// Holds what makes safe there against what the device has now.

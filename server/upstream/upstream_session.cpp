@@ -143,6 +143,7 @@ void Upstream::close(std::function<void()> closed) {
     if (closed) closed();
   });
   disconnect_when_safe(connection);
+  locks_->handle_closed(*this);
   tell_lost(lost_error());
 }
 

@@ -314,6 +314,32 @@ TEST_CASE("a safe value that a lost session has not answered is sent by one that
   own->close();
 }
 
+TEST_CASE("a safe value that is in doubt when its session is closed is sent by one that is open") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  bench.open();
+  answer_within(bench, 50ms);
+  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  const auto locks = bench.device->locks_of("bench");
+  std::optional<rr::Reply<void>> unanswered;
+  {
+    HearingClient holder(own);
+    take_lease(bench, own, holder);
+    leave_unanswered(bench, device, own, holder);
+    unanswered = std::exchange(device.waiting, std::nullopt);
+    const auto asked = bench.ask_by(*own, holder, rr::CallKind::function, "bench", "wait");
+    REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+    CHECK((*asked)->error().code == rr::ErrorCode::request_timeout);
+  }
+  CHECK(locks->is_owing());  // a session that would rest stays open
+  device.waiting.reset();
+  own->close();
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  (*device.waiting)();
+  CHECK(bench.run_until([&] { return !locks->is_owing(); }));
+}
+
 TEST_CASE("a safe value that is refused because of a lock of a lost session is sent again behind the unlocking") {
   Guarded made("wait");
   auto& [device, bench, own] = made;
