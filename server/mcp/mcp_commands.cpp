@@ -1,5 +1,8 @@
 // What agents command: found, judged, shown to a person, judged again, given under a lease. Layer: server/mcp. See
 // docs/mcp.md.
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 
 #include "core/types/value_size.hpp"
@@ -21,6 +24,8 @@ constexpr std::size_t largest_results = 1024u * 1024;  // bytes of values; as JS
 
 /// What a device may take to answer; it is the lease that bounds it.
 constexpr std::chrono::seconds longest_call{50};
+/// What a stop may take until it is answered as sent.
+constexpr std::chrono::seconds longest_stop{2};
 /// What a sign of life may take: while one is written, nobody looks whether the lease has to end.
 constexpr milliseconds longest_sign{500};
 /// The gateway holds the lease for the agent as long as its request is there; both parts of it take less.
@@ -66,6 +71,14 @@ class AgentLease {
   std::shared_ptr<ValueClient> holder_;
   std::string path_;
   std::shared_ptr<std::string> lost_;  ///< why; empty: it is held
+};
+
+/// A stop that the device has not answered, and for how long that is waited for.
+struct OpenStop {
+  explicit OpenStop(const boost::asio::any_io_executor& executor) : end(executor, longest_stop) {}
+
+  std::optional<rr::Result<>> result;
+  boost::asio::steady_timer end;
 };
 
 std::string why_of(const JsonRequest& arguments) {
@@ -402,11 +415,21 @@ McpTools::Answer McpTools::stop(JsonRequestPtr arguments) {
   const auto target = co_await find(arguments, true);
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
   const auto entry = gateway_.access().begin(who(), access_request(*target, Verb::call), trace, "stop");
-  const auto stopped = target->client->upstream()->stop_object(target->path());
-  if (entry) entry->finish(stopped);
-  if (!stopped) throw rr::Exception(stopped.error());
+  const auto stop = std::make_shared<OpenStop>(reply_.writer().executor());
+  target->client->upstream()->stop_object(target->path(), [stop, entry](const rr::Result<>& result) {
+    if (entry) entry->finish(result);
+    stop->result = result;
+    stop->end.cancel();
+  });
+  if (!stop->result) {
+    has_asked_device_ = true;
+    (void)co_await stop->end.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
+  }
+  const auto& result = stop->result;
+  if (result && !*result) throw rr::Exception(result->error());
   auto out = rr::OrderedJson::object();
-  rr::add_key(out, "stopped") = target->path();
+  rr::add_key(out, result ? "stopped" : "sent") = target->path();
+  if (!result) rr::add_key(out, "unanswered") = "the device has not answered yet: whether it is safe is not known";
   co_return out;
 }
 

@@ -218,16 +218,16 @@ void ServiceLocks::give_back_kept(const std::string& path) {
   settle();
 }
 
-rr::Result<> ServiceLocks::make_safe(std::string_view path) {
+void ServiceLocks::make_safe(std::string_view path, std::function<void(const rr::Result<>&)> done) {
   const auto key = canonical_lock_path(path);
   if (!device_.config().leases.is_offered || !safe_->has(key))
-    return rr::make_error(rr::ErrorCode::not_implemented_error,
-                          "the gateway knows nothing that makes " + rr::quote(key) +
-                              " safe: the configuration of device " + rr::quote(device_.config().name) +
-                              " declares no \"leases\" with \"safe\" there");
-  if (!safe_->send(key, open_upstream(nullptr)))
-    return rr::make_error(rr::ErrorCode::connection_error, "the device is away; it is made safe when it is back");
-  return safe_->check(key);
+    return done(rr::make_error(rr::ErrorCode::not_implemented_error,
+                               "the gateway knows nothing that makes " + rr::quote(key) +
+                                   " safe: the configuration of device " + rr::quote(device_.config().name) +
+                                   " declares no \"leases\" with \"safe\" there"));
+  safe_->send(
+      key, open_upstream(nullptr),
+      [fits = safe_->check(key), done = std::move(done)](const rr::Result<>& answer) { done(answer ? fits : answer); });
 }
 
 void ServiceLocks::end_leases(const std::string& why) {

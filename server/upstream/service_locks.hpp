@@ -63,8 +63,9 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   std::vector<HeldLease> leases() const { return leases_.held(); }
   /// Sends the safe values at and below a path now, whoever has locks and leases there.
   /// Errors   not_implemented_error: none are declared; those of SafeValues::check(), where not all could be sent;
-  /// connection_error: they are sent as soon as the device is back.
-  rr::Result<> make_safe(std::string_view path);
+  /// connection_error: they are sent as soon as the device is back; those of the device.
+  /// `done`  called once, at once or when the device has answered.
+  void make_safe(std::string_view path, std::function<void(const rr::Result<>&)> done);
   /// Whether the device is still to be made safe, or may have to be made safe again: see SafeValues::is_owing().
   bool is_owing() const { return safe_->is_owing(); }
   /// Every lease ends, because the gateway or the device goes.

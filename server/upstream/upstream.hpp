@@ -195,7 +195,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void end_leases(const std::string& why) { locks_->end_leases(why); }
 
   /// See ServiceLocks::make_safe().
-  rr::Result<> stop_object(std::string_view path) { return locks_->make_safe(path); }
+  void stop_object(std::string_view path, std::function<void(const rr::Result<>&)> done) {
+    locks_->make_safe(path, std::move(done));
+  }
 
   // For ServiceLocks.
   std::uint64_t number() const { return number_; }

@@ -282,6 +282,31 @@ def test_every_agent_may_stop_past_leases(lab):
     assert "declares no" in made.refusal(nothing)
 
 
+def stop_by(made):
+    return call(made.port, "stop", made.agent, device="interop", path="plain")
+
+
+def outcomes_of_stops(made):
+    return [each["outcome"] for each in records(made.folder, "stop")]
+
+
+def test_a_stop_that_the_device_refuses_is_an_error(lab):
+    made = lab(leases={**LEASES, "safe": [{"call": "plain.ask", "arguments": ["may it stop?"]}]})  # whom nobody answers
+    refused = stop_by(made)
+    assert refused.is_error and "InvalidOperation" in refused.structured_content["error"]["from_device"]
+    assert outcomes_of_stops(made) == ["error"]
+
+
+def test_a_stop_that_the_device_has_not_answered_yet_is_told_as_sent(lab):
+    made = lab(leases={**LEASES, "safe": [{"call": "plain.move", "arguments": [0]}]})
+    sent = stop_by(made)
+    assert not sent.is_error, sent.structured_content
+    assert sent.structured_content["sent"] == "plain" and "stopped" not in sent.structured_content
+    assert outcomes_of_stops(made) == []
+    made.arm.finish()
+    wait_for(lambda: outcomes_of_stops(made) == ["ok"])
+
+
 def test_an_agent_is_told_what_it_may_and_on_which_terms(lab):
     made = lab({"roles": ["agent"], "members": ["speed"], "may": ["read", "write"],
                 "agent": {"limits": {"speed": [0, 1]}, "lease": False}})

@@ -384,6 +384,31 @@ TEST_CASE("a safe value that is refused because of somebody's lock is owed until
   CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
+TEST_CASE("a stop is sent by the session that the device lets pass a lock, and told when it is answered") {
+  Guarded made("stop");
+  auto& [device, bench, own] = made;
+  HearingClient holder(own);
+  made.lock(own, holder, rr::LockCommand::lock_for_user);
+  std::optional<rr::Result<>> stopped;
+  bench.upstream->stop_object("bench", [&](const rr::Result<>& result) { stopped = result; });
+  REQUIRE(bench.run_until([&] { return stopped.has_value(); }));
+  CHECK(stopped->has_value());
+  CHECK(device.commands == std::vector<std::string>{"stop"});
+}
+
+TEST_CASE("a stop that the device does not take has failed") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  bench.open();
+  std::optional<rr::Result<>> stopped;
+  bench.upstream->stop_object("bench", [&](const rr::Result<>& result) { stopped = result; });
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  CHECK_FALSE(stopped);
+  device.waiting->fail({rr::ErrorCode::operation_failed, "the brake is stuck"});
+  REQUIRE(bench.run_until([&] { return stopped.has_value(); }));
+  CHECK(stopped->error().message == "the brake is stuck");
+}
+
 TEST_CASE("a safe value that fits no more holds up no other that is owed") {
   TwoStops made;
   auto& [device, bench, holder] = made;
