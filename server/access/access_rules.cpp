@@ -200,6 +200,15 @@ bool AccessRules::gives_any(const Identity& who, Verb verb) const {
                      [&](const AccessRule& rule) { return gives(rule, verb) && is_for(rule, who); });
 }
 
+bool AccessRules::may_command(const Identity& who, const AccessRequest& object) const {
+  if (may_all(who) && !is_agent(who)) return true;
+  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
+    return (gives(rule, Verb::write) || gives(rule, Verb::call)) && is_for(rule, who) &&
+           (rule.agent || !is_agent(who)) && fits(rule.devices, object.device) && fits(rule.services, object.service) &&
+           leads_to(rule.paths, object.path);
+  });
+}
+
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
   if (may_all(who)) return true;

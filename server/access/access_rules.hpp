@@ -106,6 +106,9 @@ class AccessRules {
   /// Whether there may be something that somebody may do this to.
   bool gives_any(const Identity& who, Verb verb) const;
 
+  /// Whether there may be anything of an object, or of one below it, that somebody may write or call.
+  bool may_command(const Identity& who, const AccessRequest& object) const;
+
   bool is_open() const { return !needs_login_; }
   bool has_rules() const { return !rules_.empty(); }
 

@@ -35,6 +35,10 @@ class Standing {
   /// See Access::check_and_begin(). Null also where it is recorded the first time alone, and this is not that.
   [[nodiscard]] rr::Result<AuditEntryPtr> check_and_begin(const AccessRequest& what, std::string_view trace,
                                                           Recorded recorded, std::string_view event = {});
+  /// See AccessRules::may_command(). False also: not good any more.
+  bool may_command(const AccessRequest& object) {
+    return is_good() && access_.state().rules.may_command(identity_, object);
+  }
   /// See Access::begin().
   AuditEntryPtr begin(const AccessRequest& what, std::string_view event = {}) {
     return access_.begin(identity(), what, {}, event);

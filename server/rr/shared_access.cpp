@@ -150,6 +150,13 @@ rr::Result<> SessionRights::admit_lock(std::string_view path, const rr::Authenti
   return standing_of(user).check(request, recorded);
 }
 
+bool SessionRights::may_command(std::string_view path, const rr::AuthenticatedUser* user) {
+  if (access_.is_open()) return true;
+  const auto service = rr::first_segments(path, 1);
+  const auto device = node_.device_of(service);
+  return standing_of(user).may_command({.device = device, .service = service, .path = path});
+}
+
 AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
   if (!admitted.member || recorded_of(admitted.type) != Recorded::each_time) return nullptr;
   AccessRequest what{

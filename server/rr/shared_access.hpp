@@ -27,6 +27,8 @@ class SessionRights {
   void record_too_much(const rr::MemberAccess& admitted, std::string_view why);
   /// Whether the client may lock an object. Errors   permission_denied.
   [[nodiscard]] rr::Result<> admit_lock(std::string_view path, const rr::AuthenticatedUser* user, Recorded recorded);
+  /// Whether the client may write or call anything at or below an object.
+  bool may_command(std::string_view path, const rr::AuthenticatedUser* user);
   AuditEntryPtr begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user);
   bool has_role(std::string_view role, const rr::AuthenticatedUser* user) {
     return standing_of(user).identity().has_role(role);

@@ -426,6 +426,10 @@ bool SharedClient::has_role(std::string_view role) const {
   return rights_ && rights_->has_role(role, session_.user());
 }
 
+bool SharedClient::may_command(const std::string& path) const {
+  return !rights_ || rights_->may_command(path, session_.user());
+}
+
 void SharedClient::begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done) {
   const bool is_recorded =
       wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;

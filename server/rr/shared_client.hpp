@@ -85,6 +85,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   bool has_role(std::string_view role) const override;
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
   bool may_lock(const std::string& path) const override;
+  bool may_command(const std::string& path) const override;
   std::shared_ptr<Upstream> upstream_in_use() const override { return home_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, &callback);

@@ -87,9 +87,13 @@ void ServiceLocks::review(const UpstreamClient& client) {
   const auto id = known->second;
   for (const auto& path : table_.paths_of(id))
     if (!client.may_lock(path)) table_.handle_right_lost(id, path, steady_now());
-  for (const auto& lease : leases_.held())
-    if (lease.holder == id && !client.may_lock(lease.path))
+  for (const auto& lease : leases_.held()) {
+    if (lease.holder != id) continue;
+    if (!client.may_lock(lease.path))
       leases_.handle_lost(lease.path, "its holder has no right to it any more");
+    else if (!client.may_command(lease.path))  // it would renew it, and the device would go on
+      leases_.handle_lost(lease.path, "its holder may neither write nor call anything there any more");
+  }
   settle();
 }
 

@@ -48,7 +48,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   /// `done`  is called exactly once; with invalid_operation where the client is removed before.
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
-  /// Gives back what the client has locked or leased, or waits for, where UpstreamClient::may_lock() says no by now.
+  /// Gives back what the client has locked or leased, or waits for, where UpstreamClient::may_lock() says no by now;
+  /// and its leases where may_command() does.
   void review(const UpstreamClient& client);
   /// Whether the client has a lock, a monitor or a lease of this object, or has lost one and not given it back.
   bool has_at(const UpstreamClient& client, std::string_view path) const;

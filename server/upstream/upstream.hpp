@@ -58,6 +58,8 @@ class UpstreamClient {
   virtual AuditEntryPtr begin_lease_end(const std::string&) const { return nullptr; }
   /// Whether it may have a lock or a lease of an object still, as its rights are now; see ServiceLocks::review().
   virtual bool may_lock(const std::string&) const { return true; }
+  /// Whether it may write or call anything at or below an object still: who may not has no use for its lease.
+  virtual bool may_command(const std::string&) const { return true; }
   /// Its lease has ended.
   virtual void lease_ended(const std::string&, const std::string&) const {}
   /// The one that its requests go by.

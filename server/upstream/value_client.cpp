@@ -86,6 +86,10 @@ bool ValueClient::may_lock(const std::string& path) const {
   return !needs_right_ || standing_->check(to_lock(path), Recorded::never).has_value();
 }
 
+bool ValueClient::may_command(const std::string& path) const {
+  return !needs_right_ || standing_->may_command(to_lock(path));
+}
+
 rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string path,
                                            std::chrono::milliseconds timeout) {
   rr::LockWanted wanted;

@@ -139,6 +139,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   bool has_role(std::string_view role) const override { return standing_ && standing_->identity().has_role(role); }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
   bool may_lock(const std::string& path) const override;
+  bool may_command(const std::string& path) const override;
   void lease_ended(const std::string& path, const std::string& why) const override {
     if (on_lease_ended_) on_lease_ended_(path, why);
   }

@@ -37,7 +37,8 @@ struct LeasedRobot {
                         config.access.tokens_file = files.write("tokens", tokens("operator"));
                         const std::vector<Verb> all{std::begin(all_verbs), std::end(all_verbs)};
                         config.access.rules = {{.roles = {"operator"}, .may = all},
-                                               {.roles = {"viewer"}, .may = {Verb::read, Verb::write}}};
+                                               {.roles = {"viewer"}, .may = {Verb::read, Verb::write}},
+                                               {.roles = {"keeper"}, .may = {Verb::read, Verb::lock}}};
                       }};
 
   std::string tokens(const std::string& role_of_ann) const {
@@ -134,4 +135,12 @@ TEST_CASE("a lease that makes the device safe is taken, and given back, however 
     CHECK(LeasedRobot::comes_to([&] {  // who may lock nothing
       return robot.ask(object + "?lease=take&deadman=1000", robot.vera).status == 429;
     }));
+}
+
+TEST_CASE("a lease ends when its holder may not command any more, though he may lock") {
+  LeasedRobot robot;
+  robot.lease(robot.ann);
+  CHECK(robot.set_speed(robot.olga) == 423);
+  robot.files.write("tokens", robot.tokens("keeper"));
+  CHECK(LeasedRobot::comes_to([&] { return robot.set_speed(robot.olga) == 204; }));
 }

@@ -326,6 +326,27 @@ TEST_CASE("rights: how much of a device somebody may do something to") {
   CHECK(AccessRules({}, true).extent(agent, "arm1", Verb::read) == Extent::all);
 }
 
+TEST_CASE("rights: who may command something of an object, or of one below it") {
+  const auto may = [](AccessRule rule, std::string_view path, Face face = Face::rest) {
+    rule.roles = {"operator"};
+    auto olga = who("olga", {"operator"});
+    olga.face = face;
+    const AccessRequest object{.device = "create", .service = "Create", .path = path};
+    return AccessRules({std::move(rule)}, true).may_command(olga, object);
+  };
+  CHECK(may({.may = {Verb::write}}, "Create"));
+  CHECK(may({.members = {"Drive"}, .may = {Verb::call}}, "Create"));
+  CHECK_FALSE(may({.may = {Verb::read, Verb::subscribe, Verb::lock}}, "Create"));
+  CHECK(may({.paths = {"Create.axes*"}, .may = {Verb::call}}, "Create"));
+  CHECK_FALSE(may({.paths = {"Create"}, .may = {Verb::call}}, "Create.axes[0]"));
+  CHECK_FALSE(may({.devices = {"arm1"}, .may = {Verb::call}}, "Create"));
+  CHECK_FALSE(may({.services = {"Arm"}, .may = {Verb::call}}, "Create"));
+  CHECK_FALSE(may({.may = {Verb::call}}, "Create", Face::mcp));
+  CHECK(may({.may = {Verb::call}, .agent = AgentTerms()}, "Create", Face::mcp));
+  const AccessRequest object{.device = "create", .service = "Create", .path = "Create"};
+  CHECK(AccessRules().may_command(who("", {}, Proof::none), object));
+}
+
 TEST_CASE("rights: a device is seen by those who may do something with it, and by no one else") {
   const std::vector<AccessRule> list{
       AccessRule{
