@@ -14,8 +14,6 @@ constexpr std::size_t max_waiting = 1024;  ///< for one monitor
 /// The device forgets a monitor whose owner was idle for 30 s. A little earlier here: an owner that is refused in vain
 /// is better than two that are not.
 constexpr std::chrono::seconds idle_timeout{25};
-/// The reference keeps a session that it does not hear of for ten minutes, and then looks for such in turns.
-constexpr std::chrono::minutes longest_kept{15};
 
 rr::Error locked(std::string why) {
   return {rr::ErrorCode::object_locked_error, std::move(why)};
@@ -47,17 +45,6 @@ std::string canonical_index(std::string_view index) {
   if (digits.empty() || !std::all_of(digits.begin(), digits.end(), is_digit)) return std::string(index);
   while (digits.size() > 1 && digits.front() == '0') digits.remove_prefix(1);
   return (index.front() == '-' && digits != "0" ? "-" : "") + std::string(digits);
-}
-
-/// Of the object at a path or of one above it. `map`  by canonical path.
-template <class Map>
-auto find_at_or_above(Map& map, std::string_view path) {
-  for (;;) {
-    const auto found = map.find(path);
-    const auto end = path.rfind('.');
-    if (found != map.end() || end == std::string_view::npos) return found;
-    path = path.substr(0, end);
-  }
 }
 
 }  // namespace
@@ -160,7 +147,7 @@ void LockTable::ask(Hold& hold, Asking what, LockSession session, rr::LockComman
 void LockTable::handle_answer(std::uint64_t id, const rr::Result<>& result, rr::TimePoint now) {
   const auto is_it = [id](const auto& item) { return item.second.ask == id && item.second.asking != Asking::nothing; };
   if (const auto lock = std::find_if(locks_.begin(), locks_.end(), is_it); lock != locks_.end())
-    return lock_answered(lock, result, now);
+    return lock_answered(lock, result);
   if (const auto monitor = std::find_if(monitors_.begin(), monitors_.end(), is_it); monitor != monitors_.end())
     return monitor_answered(monitor, result, now);
 }
@@ -180,7 +167,6 @@ void LockTable::handle_lost(LockSession session, rr::TimePoint now) {
     const bool is_held = lock.asking == Asking::nothing || lock.asking == Asking::override_it;
     if (!is_held || lock.owner == 0 || (lock.session != session && !is_of_user)) continue;
     note_lost_lock(at->first, lock, why);
-    note_kept(at->first, lock, now);
     lock.owner = 0;
     if (lock.asking == Asking::nothing) locks_.erase(at);
   }
@@ -256,7 +242,12 @@ bool LockTable::owns(LockClient client, const Hold& lock) const {
 }
 
 LockTable::Locks::iterator LockTable::find_covering(std::string_view path) {
-  return find_at_or_above(locks_, path);
+  for (;;) {
+    if (const auto found = locks_.find(path); found != locks_.end()) return found;
+    const auto end = path.rfind('.');
+    if (end == std::string_view::npos) return locks_.end();
+    path = path.substr(0, end);
+  }
 }
 
 void LockTable::lock(LockClient client, const rr::LockWanted& wanted) {
@@ -326,23 +317,9 @@ void LockTable::note_lost_lock(const std::string& key, const Hold& lock, const s
     if (owns(client, lock)) lost_locks_[{client, key}] = why;
 }
 
-void LockTable::note_kept(const std::string& key, const Hold& lock, rr::TimePoint now) {
-  std::erase_if(kept_, [now](const auto& kept) { return kept.second.until <= now; });
-  kept_[key] = {lock.session, lock.path, now + longest_kept};
-}
-
-void LockTable::forget_kept_around(std::string_view key) {
-  std::erase_if(kept_,
-                [key](const auto& kept) { return rr::is_within(kept.first, key) || rr::is_within(key, kept.first); });
-}
-
-void LockTable::lock_answered(Locks::iterator at, const rr::Result<>& result, rr::TimePoint now) {
+void LockTable::lock_answered(Locks::iterator at, const rr::Result<>& result) {
   auto& lock = at->second;
   const auto was = std::exchange(lock.asking, Asking::nothing);
-  const bool is_lost = !result && result.error().code == rr::ErrorCode::connection_error;
-  if (is_lost && was != Asking::override_it) note_kept(at->first, lock, now);
-  if (result && was == Asking::take) forget_kept_around(at->first);
-  if (result && was != Asking::take) kept_.erase(at->first);
   const auto asker = std::exchange(lock.asker, 0);
   const auto session = lock.session;
   const auto leaver = lock.leaver;
@@ -365,21 +342,6 @@ void LockTable::lock_answered(Locks::iterator at, const rr::Result<>& result, rr
   locks_.erase(at);
   if (was == Asking::give_back && is_unknown(result)) events_.push_back(LockSessionInDoubt{session});
   end_leaving(leaver);
-}
-
-/// From nobody: who had it hears of that when he asks for something there.
-void LockTable::give_back_kept(std::string_view path) {
-  const auto found = find_at_or_above(kept_, canonical_lock_path(path));
-  if (found == kept_.end()) return;
-  const auto kept = *found;
-  const auto below = locks_.lower_bound(kept.first + ".");
-  const bool is_below = below != locks_.end() && rr::is_within(below->first, kept.first);
-  if (is_below || find_covering(kept.first) != locks_.end()) return;
-  kept_.erase(found);
-  auto& stale = locks_[kept.first];
-  stale.path = kept.second.path;
-  stale.session = kept.second.session;
-  ask(stale, Asking::give_back, stale.session, rr::LockCommand::unlock);
 }
 
 // --- monitors ---
@@ -589,16 +551,9 @@ bool LockTable::has_at(LockClient client, std::string_view path) const {
          (monitor != monitors_.end() && monitor->second.owner == client);
 }
 
-std::optional<LockSession> LockTable::session_at(std::string_view path) {
-  const auto key = canonical_lock_path(path);
-  if (const auto lock = find_covering(key); lock != locks_.end()) return lock->second.session;
-  const auto monitor = monitors_.find(key);
-  return monitor == monitors_.end() ? std::nullopt : std::optional(monitor->second.session);
-}
-
-std::optional<LockSession> LockTable::find_kept(std::string_view path, rr::TimePoint now) const {
-  const auto found = find_at_or_above(kept_, canonical_lock_path(path));
-  return found == kept_.end() || found->second.until <= now ? std::nullopt : std::optional(found->second.session);
+std::optional<LockSession> LockTable::locked_by(std::string_view path) {
+  const auto lock = find_covering(canonical_lock_path(path));
+  return lock == locks_.end() ? std::nullopt : std::optional(lock->second.session);
 }
 
 std::optional<LockEvent> LockTable::poll_event() {

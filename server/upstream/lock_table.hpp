@@ -87,8 +87,6 @@ class LockTable {
   void handle_released(std::string_view path, rr::TimePoint now);
   /// A client may not lock an object any more: what it has there is given back, and it is refused until it unlocks.
   void handle_right_lost(LockClient client, std::string_view path, rr::TimePoint now);
-  /// Unlocks in the name of nobody what find_kept() has found, unless a lock there is being changed already.
-  void give_back_kept(std::string_view path);
   /// A client has the lease of an object: others who wait for a monitor there, or below, are refused with `why`.
   void handle_leased(LockClient client, std::string_view path, const rr::Error& why);
   void handle_timeout(rr::TimePoint now);
@@ -105,10 +103,8 @@ class LockTable {
   std::vector<std::string> paths_of(LockClient client) const;
   /// Whether a client has one of this object, or has lost one and was not told so yet.
   bool has_at(LockClient client, std::string_view path) const;
-  /// The session that the device lets use an object which a lock covers, or which a monitor is of. nullopt: any.
-  std::optional<LockSession> session_at(std::string_view path);
-  /// The session with which a lock was lost that covers an object, and that the device may keep. nullopt: none.
-  std::optional<LockSession> find_kept(std::string_view path, rr::TimePoint now) const;
+  /// The session that has, or is about to have, the lock that covers an object. nullopt: there is none.
+  std::optional<LockSession> locked_by(std::string_view path);
 
   // --- answers ---
 
@@ -147,12 +143,6 @@ class LockTable {
     rr::TimePoint idle_deadline;
     std::deque<Waiting> queue;
   };
-  /// A lock that was lost with its session: a device that was only out of reach keeps it for a while.
-  struct Kept {
-    LockSession session = 0;
-    std::string path;  ///< as its owner has spelled it
-    rr::TimePoint until;
-  };
   using Locks = std::map<std::string, Hold, std::less<>>;
   using Monitors = std::map<std::string, Monitor, std::less<>>;
   /// What a client holds no more without having given it back, and why. By canonical path.
@@ -165,14 +155,11 @@ class LockTable {
   void answer(LockClient client, rr::LockRequestId request, rr::Result<> result);
   void end_leaving(LockClient leaver);
   void note_lost_lock(const std::string& key, const Hold& lock, const std::string& why);
-  void note_kept(const std::string& key, const Hold& lock, rr::TimePoint now);
-  /// The device has given a lock of this object: none was left at, above or below it.
-  void forget_kept_around(std::string_view key);
 
   void lock(LockClient client, const rr::LockWanted& wanted);
   void unlock(LockClient client, const rr::LockWanted& wanted);
   void take_back_lock(Hold& lock, LockClient leaver);
-  void lock_answered(Locks::iterator at, const rr::Result<>& result, rr::TimePoint now);
+  void lock_answered(Locks::iterator at, const rr::Result<>& result);
 
   void enter(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now);
   void exit(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now);
@@ -184,9 +171,8 @@ class LockTable {
   void monitor_answered(Monitors::iterator at, const rr::Result<>& result, rr::TimePoint now);
 
   std::map<LockClient, LockParty> parties_;
-  Locks locks_;                                    ///< by canonical path; no two overlap
-  Monitors monitors_;                              ///< by canonical path
-  std::map<std::string, Kept, std::less<>> kept_;  ///< by canonical path
+  Locks locks_;        ///< by canonical path; no two overlap
+  Monitors monitors_;  ///< by canonical path
   Lost lost_locks_;
   Lost lost_monitors_;
   std::uint64_t last_ask_ = 0;

@@ -96,7 +96,8 @@ SafeValues::~SafeValues() {
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
   for (auto& item : items_) item.is_checked = false;
   handle_lost(upstream->number());  // its session before this one may have been closed while it rested
-  handle_unlocked();                // what the device has kept for a lost session this one may give back
+  for (const auto& path : std::exchange(refused_, {}))  // this one may be let in
+    if (!links_.is_leased(path)) owed_.push_back(path);
   for (std::size_t i = 0; i < items_.size(); ++i) look_up(i, upstream);
   pay(upstream);
 }
@@ -209,18 +210,26 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
   answers->expect_one();  // the end of this
   for (const auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.last) continue;
-    const auto holder = links_.find_session(item.action.path);
-    const auto& sender = holder ? holder : by;
     answers->expect_one();
-    sender->make_safe(*item.last, [weak = weak_from_this(), sender, answers,
-                                   action = item.action](const rr::Result<rr::Value>& result) {
-      const auto self = weak.lock();
-      if (!result && self) self->handle_failed(action, *sender, result.error());
-      answers->add(result ? rr::Result<>() : rr::Result<>(result.error()));
-    });
+    send_item(item, by, [answers](const rr::Result<>& answer) { answers->add(answer); });
   }
   answers->add({});
   return !by->is_lost();
+}
+
+void SafeValues::send_item(const Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered) {
+  by->make_safe(*item.last, [weak = weak_from_this(), &item, by, answered](const rr::Result<rr::Value>& result) {
+    const auto self = weak.lock();
+    if (result || !self) return answered(result ? rr::Result<>() : rr::Result<>(result.error()));
+    const auto& path = item.action.path;
+    const bool is_locked = result.error().code == rr::ErrorCode::object_locked_error;
+    if (const auto holder = is_locked ? self->links_.locked_by(path) : nullptr; holder && holder != by) {
+      holder->forget_commands(path);
+      return self->send_item(item, holder, answered);
+    }
+    self->handle_failed(item.action, *by, result.error());
+    answered(result.error());
+  });
 }
 
 void SafeValues::handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error) {
@@ -232,7 +241,6 @@ void SafeValues::handle_failed(const SafeAction& action, const Upstream& by, con
     doubts_.push_back({action.path, by.number()});
   if (error.code != rr::ErrorCode::object_locked_error) return;
   refused_.push_back(action.path);
-  links_.locked(action.path);
 }
 
 }  // namespace rrgate

@@ -31,12 +31,10 @@ struct SafeLinks {
   /// Whether somebody has a lease of an object: what was sent before and has not arrived is not sent again then, as the
   /// end of that lease makes the object safe.
   std::function<bool(const std::string& path)> is_leased = [](const std::string&) { return false; };
-  /// The session that the device lets use an object, because of a lock; null: any.
-  std::function<std::shared_ptr<Upstream>(const std::string& path)> find_session = [](const std::string&) {
+  /// The session that has the lock of an object, and is open; null: there is none.
+  std::function<std::shared_ptr<Upstream>(const std::string& path)> locked_by = [](const std::string&) {
     return nullptr;
   };
-  /// The device refuses an object because of a lock: handle_unlocked() follows where that can be given back.
-  std::function<void(const std::string& path)> locked = [](const std::string&) {};
 };
 
 /// Lives in a shared_ptr, which its requests that are under way do not keep.
@@ -66,7 +64,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one. So are those that a session which is lost later has not answered, and those
   /// that the device refuses because of a lock as soon as one may be gone.
-  /// `by`  the session where the device does not want another, see SafeLinks::find_session.
+  /// `by`  the session; where the device refuses that because of a lock, the one that has the lock follows it.
   /// `answered`  called once, when all are answered: the first error; connection_error: they could not be sent.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered = nullptr);
   /// Sends what could not be sent before, where it has been held against what the device is now.
@@ -97,6 +95,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   void take(Item& item, rr::Result<SafeRequest> request);
   bool is_checked(std::string_view path) const;
   void pay_due(const std::shared_ptr<Upstream>& upstream, const std::function<bool(const std::string&)>& is_due);
+  void send_item(const Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered);
   void owe_again(const std::string& path);
   void handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error);
 

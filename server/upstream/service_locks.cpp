@@ -210,16 +210,11 @@ std::shared_ptr<Upstream> ServiceLocks::open_upstream(const std::shared_ptr<Upst
   return nullptr;
 }
 
-std::shared_ptr<Upstream> ServiceLocks::open_session(std::optional<LockSession> session) {
+std::shared_ptr<Upstream> ServiceLocks::locked_by(const std::string& path) {
+  const auto session = table_.locked_by(path);
   const auto known = session ? upstreams_.find(*session) : upstreams_.end();
   auto upstream = known == upstreams_.end() ? nullptr : known->second.lock();
   return upstream && upstream->may_act() ? upstream : nullptr;
-}
-
-void ServiceLocks::give_back_kept(const std::string& path) {
-  if (!open_session(table_.find_kept(path, steady_now()))) return;
-  table_.give_back_kept(path);
-  settle();
 }
 
 void ServiceLocks::make_safe(std::string_view path, std::function<void(const rr::Result<>&)> done) {
@@ -252,14 +247,10 @@ void ServiceLocks::handle_opened(const std::shared_ptr<Upstream>& upstream) {
                      const auto self = weak.lock();
                      return self && self->leases_.is_held(path);
                    },
-               .find_session =
+               .locked_by =
                    [weak](const std::string& path) {
                      const auto self = weak.lock();
-                     return self ? self->open_session(self->table_.session_at(path)) : nullptr;
-                   },
-               .locked =
-                   [weak](const std::string& path) {
-                     if (const auto self = weak.lock()) self->give_back_kept(path);
+                     return self ? self->locked_by(path) : nullptr;
                    }});
   safe_->handle_opened(upstream);
 }

@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -93,10 +92,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void end_leases();
   void pay_or_wake();
   std::shared_ptr<Upstream> open_upstream(const std::shared_ptr<Upstream>& first);
-  /// Null: it is not open, or has none.
-  std::shared_ptr<Upstream> open_session(std::optional<LockSession> session);
-  /// What the device keeps for a session that was lost is unlocked by the one that has followed it.
-  void give_back_kept(const std::string& path);
+  /// The session that has the lock of an object. Null: nobody has, or it is not open.
+  std::shared_ptr<Upstream> locked_by(const std::string& path);
 
   /// Does what the table wants done.
   void settle();

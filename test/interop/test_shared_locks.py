@@ -287,7 +287,7 @@ def test_a_lock_that_the_device_keeps_for_a_lost_session(site):
         other.speed = 6.0
 
 
-def test_a_lock_that_the_device_keeps_for_a_lost_session_does_not_keep_it_from_being_made_safe(node, tmp_path):
+def test_a_device_is_made_safe_once_a_lock_that_it_keeps_for_a_lost_session_is_given_back(node, tmp_path):
     leases = {"safe": [{"property": "guarded.speed", "value": 0}]}
     site = Site(tmp_path, node, {**GATEWAY_LOGIN, "leases": leases})
     try:
@@ -295,11 +295,13 @@ def test_a_lock_that_the_device_keeps_for_a_lost_session_does_not_keep_it_from_b
             page.ask("lock", kind="client")
             page.ask("lease", deadman=60000)
             page.ask("set", "speed", value=2)
-            arm = site.direct("guarded", "alice")
-            assert is_refused(LOCKED, lambda: arm.speed)
+            arm, other = site.direct("guarded", "alice"), site.connect()
             site.line.cut()
-            site.gateway.wait_until(lambda: not is_refused(LOCKED, lambda: arm.speed))
-            site.gateway.wait_until(lambda: arm.speed == 0)
+            page.next(lease="guarded", state="ended")
+            site.wait_until_served(other)
+            assert is_refused(LOCKED, lambda: arm.speed)
+            page.ask("unlock")
+            site.gateway.wait_until(lambda: not is_refused(LOCKED, lambda: arm.speed) and arm.speed == 0)
     finally:
         site.stop()
 

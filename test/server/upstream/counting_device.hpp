@@ -26,6 +26,7 @@ object Bench
     function int32{generator} count()
     function void fill(uint8[]{generator} bytes)
     function void wait()
+    function void halt() [nolock]
     function void take(uint8[] bytes)
     function void stop()
     objref Bench spare
@@ -38,7 +39,7 @@ end
 struct Counting {
   std::shared_ptr<const bool> life = std::make_shared<const bool>(true);
   std::shared_ptr<rr::Service> service = rr::Service::from_text({bench_definition}, "bench", "Bench");
-  std::optional<rr::Reply<void>> waiting;  ///< whoever called wait()
+  std::optional<rr::Reply<void>> waiting;  ///< whoever called wait() or halt()
   std::vector<std::string> commands;       ///< calls of stop(), and values of "wish"
   std::int32_t number = 1;
   int reads = 0;  ///< of the number
@@ -57,6 +58,7 @@ struct Counting {
     service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->root().objref("things", [this](std::string_view) { return thing; });
     service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
+    service->function("halt", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
     service->function("take", [](const std::vector<std::uint8_t>&) {});
     service->property("number")
         .get([this] {

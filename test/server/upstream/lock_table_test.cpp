@@ -651,43 +651,16 @@ TEST_CASE("who may not lock any more has given back what it had, and is told so 
   t.nothing_more();
 }
 
-TEST_CASE("a lock that the device may keep for a lost session is given back once, by that session") {
+TEST_CASE("it is known by which session an object is locked") {
   Transcript t;
-  const auto one = t.shares(1);
-  t.takes(one, LockCommand::lock_for_client, shared, "s.arm");
-  t.table.handle_lost(shared, t.now);
-  t.table.remove(one, t.now);
-  t.left(one);
-  CHECK_FALSE(t.table.find_kept("s", t.now));
-  CHECK_FALSE(t.table.find_kept("s.arm", t.now + std::chrono::hours(1)));
-  REQUIRE(t.table.find_kept("s.arm.hand", t.now) == shared);
-  t.table.give_back_kept("s.arm.hand");
-  t.device_says(t.asked(LockCommand::unlock, shared, "s.arm"), ErrorCode::connection_error);
-  REQUIRE(t.table.find_kept("s.arm", t.now) == shared);
-  t.table.give_back_kept("s.arm");
-  t.device_says(t.asked(LockCommand::unlock, shared, "s.arm"), ErrorCode::object_locked_error);  // somebody else's now
-  CHECK_FALSE(t.table.find_kept("s.arm", t.now));
-  t.table.give_back_kept("s.arm");
-  t.nothing_more();
-}
-
-TEST_CASE("a lock that the device has given shows that it keeps none for a lost session") {
-  Transcript t;
-  const auto one = t.shares(1);
   const auto alice = t.has_own(2, "alice", alices);
-  t.takes(one, LockCommand::lock_for_client, shared, "s.arm");
-  CHECK(t.table.session_at("s.arm.hand") == shared);
-  CHECK_FALSE(t.table.session_at("s"));
-  t.table.handle_lost(shared, t.now);
-  CHECK_FALSE(t.table.session_at("s.arm"));
-  t.wants(alice, LockCommand::lock_for_user);
-  const auto lock = t.asked(LockCommand::lock_for_user, alices);
-  t.table.give_back_kept("s.arm");  // not while the device is asked
-  t.nothing_more();
-  t.device_says(lock);
-  t.answered(alice);
-  CHECK(t.table.session_at("s.arm") == alices);
-  CHECK_FALSE(t.table.find_kept("s.arm", t.now));
+  CHECK_FALSE(t.table.locked_by("s.arm"));
+  t.takes(alice, LockCommand::lock_for_user, alices, "s.arm");
+  CHECK(t.table.locked_by("s.arm") == alices);
+  CHECK(t.table.locked_by("s.arm.hand") == alices);
+  CHECK_FALSE(t.table.locked_by("s"));
+  t.table.handle_lost(alices, t.now);
+  CHECK_FALSE(t.table.locked_by("s.arm"));
 }
 
 TEST_CASE("a right to lock that is lost while the device is asked leaves nothing behind") {

@@ -343,14 +343,15 @@ TEST_CASE("a safe value that is in doubt when its session is closed is sent by o
 TEST_CASE("a safe value that is refused because of a lock of a lost session is sent again behind the unlocking") {
   Guarded made("wait");
   auto& [device, bench, own] = made;
-  std::optional<HearingClient> holder(std::in_place, bench.upstream);
-  made.lock(bench.upstream, *holder, rr::LockCommand::lock_for_client);
-  take_lease(bench, bench.upstream, *holder);
+  HearingClient holder(bench.upstream);
+  made.lock(bench.upstream, holder, rr::LockCommand::lock_for_client);
+  take_lease(bench, bench.upstream, holder);
   cut(bench, bench.upstream);
-  const bool has_left = GENERATE(false, true);
-  if (has_left) holder.reset();
   bench.open();
   made.refuse_locked();
+  bench.find("bench.others[1]");  // behind the refusal
+  CHECK_FALSE(device.waiting);
+  made.lock(bench.upstream, holder, rr::LockCommand::unlock);
   CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
@@ -384,7 +385,7 @@ TEST_CASE("a safe value that is refused because of somebody's lock is owed until
   CHECK(bench.run_until([&] { return device.waiting.has_value(); }));
 }
 
-TEST_CASE("a stop is sent by the session that the device lets pass a lock, and told when it is answered") {
+TEST_CASE("a stop that a lock keeps out is sent by the session that has the lock, and told when that is answered") {
   Guarded made("stop");
   auto& [device, bench, own] = made;
   HearingClient holder(own);
@@ -394,6 +395,16 @@ TEST_CASE("a stop is sent by the session that the device lets pass a lock, and t
   REQUIRE(bench.run_until([&] { return stopped.has_value(); }));
   CHECK(stopped->has_value());
   CHECK(device.commands == std::vector<std::string>{"stop"});
+}
+
+TEST_CASE("a stop that needs no lock is sent by the session that is asked, whoever has locked the object") {
+  Guarded made("halt");
+  auto& [device, bench, own] = made;
+  HearingClient holder(own);
+  made.lock(own, holder, rr::LockCommand::lock_for_user);
+  bench.upstream->stop_object("bench", [](const rr::Result<>&) {});
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  CHECK(device.waiting->caller().user == "gateway");
 }
 
 TEST_CASE("a stop that the device does not take has failed") {
