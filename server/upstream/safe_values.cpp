@@ -6,6 +6,7 @@
 #include "core/session/service_path.hpp"
 #include "server/json/value_from_json.hpp"
 #include "server/log/log.hpp"
+#include "server/upstream/device.hpp"
 #include "server/upstream/lock_table.hpp"
 #include "server/upstream/upstream.hpp"
 
@@ -13,9 +14,13 @@ namespace rrgate {
 
 namespace {
 
+std::string safe_member(const SafeAction& action) {
+  return action.path + "." + action.member;
+}
+
 rr::Error misfit(const SafeAction& action, const std::string& why) {
   return rr::make_error(rr::ErrorCode::invalid_configuration,
-                        "safe value " + rr::quote(action.path + "." + action.member) + " of the gateway: " + why);
+                        "safe value " + rr::quote(safe_member(action)) + " of the gateway: " + why);
 }
 
 rr::MemberKind member_kind(SafeAction::Kind kind) {
@@ -88,16 +93,18 @@ SafeValues::~SafeValues() {
   for (const auto& path : owed_)
     log(LogLevel::warning, "the device was not made safe: it was away, and the gateway stops or leaves it",
         {{"device", device_}, {"path", path}});
-  for (const auto& path : refused_)
-    log(LogLevel::warning, "the device was not made safe: it is locked, and the gateway stops or leaves it",
-        {{"device", device_}, {"path", path}});
+  for (const auto& item : items_)
+    if (item.open != Open::no)
+      log(LogLevel::warning,
+          "the device may not be safe: it has not taken a safe value, and the gateway stops or leaves it",
+          {{"device", device_}, {"member", safe_member(item.action)}});
 }
 
 void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
   for (auto& item : items_) item.is_checked = false;
   handle_lost(upstream->number());  // its session before this one may have been closed while it rested
-  for (const auto& path : std::exchange(refused_, {}))  // this one may be let in
-    if (!links_.is_leased(path)) owed_.push_back(path);
+  for (auto& item : items_)
+    if (item.open == Open::refused) owe(item);  // this one may be let in
   for (std::size_t i = 0; i < items_.size(); ++i) look_up(i, upstream);
   pay(upstream);
 }
@@ -163,7 +170,12 @@ void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
 }
 
 void SafeValues::pay_around(std::string_view path, const std::shared_ptr<Upstream>& upstream) {
-  pay_due(upstream, [&](const std::string& owed) { return rr::is_within(owed, path) || rr::is_within(path, owed); });
+  const auto is_around = [&](const std::string& owed) {
+    return rr::is_within(owed, path) || rr::is_within(path, owed);
+  };
+  for (auto& item : items_)
+    if (item.open == Open::refused && is_around(item.action.path)) item.open = Open::owed;
+  pay_due(upstream, is_around);
 }
 
 void SafeValues::pay_due(const std::shared_ptr<Upstream>& upstream,
@@ -177,22 +189,40 @@ void SafeValues::pay_due(const std::shared_ptr<Upstream>& upstream,
         log(LogLevel::warning, "the device is back, and was made safe: a lease had ended while it was away",
             {{"device", device}, {"path", path}});
     });
+  for (auto& item : items_)
+    if (item.open == Open::owed && is_due(item.action.path))
+      send_item(item, upstream, [device = device_, member = safe_member(item.action)](const rr::Result<>& answer) {
+        if (answer)
+          log(LogLevel::warning, "the device was made safe: it had not taken a safe value before",
+              {{"device", device}, {"member", member}});
+      });
+}
+
+bool SafeValues::is_owing() const {
+  return !owed_.empty() ||
+         std::any_of(items_.begin(), items_.end(), [](const Item& item) { return item.open != Open::no; });
+}
+
+bool SafeValues::has_open(Open open) const {
+  return std::any_of(items_.begin(), items_.end(), [open](const Item& item) { return item.open == open; });
 }
 
 void SafeValues::handle_lost(std::uint64_t upstream) {
-  std::vector<std::string> lost;
-  for (const auto& doubt : doubts_)
-    if (doubt.upstream == upstream) lost.push_back(doubt.path);
-  std::erase_if(doubts_, [&](const Doubt& doubt) { return doubt.upstream == upstream; });
-  for (const auto& path : lost) owe_again(path);
+  for (auto& item : items_)
+    if ((item.open == Open::unanswered || item.open == Open::refused) && item.upstream == upstream) owe(item);
+  end_waiting();
+  if (has_open(Open::owed)) links_.owed();
 }
 
-void SafeValues::handle_unlocked() {
-  for (const auto& path : std::exchange(refused_, {})) owe_again(path);
+void SafeValues::send_again() {
+  again_.reset();
+  for (auto& item : items_)
+    if (item.open == Open::refused) owe(item);
+  if (has_open(Open::owed)) links_.owed();
 }
 
-void SafeValues::owe_again(const std::string& path) {
-  if (!links_.is_leased(path)) send(path, nullptr);
+void SafeValues::owe(Item& item) {
+  item.open = links_.is_leased(item.action.path) ? Open::no : Open::owed;
 }
 
 bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered) {
@@ -204,12 +234,11 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
     return false;
   }
   by->forget_commands(path);
-  std::erase_if(doubts_, [&](const Doubt& doubt) { return rr::is_within(doubt.path, path); });
-  std::erase_if(refused_, [&](const std::string& refused) { return rr::is_within(refused, path); });
   const auto answers = std::make_shared<Answers>(std::move(answered));
   answers->expect_one();  // the end of this
-  for (const auto& item : items_) {
+  for (auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.last) continue;
+    item.failure.reset();
     answers->expect_one();
     send_item(item, by, [answers](const rr::Result<>& answer) { answers->add(answer); });
   }
@@ -217,30 +246,56 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
   return !by->is_lost();
 }
 
-void SafeValues::send_item(const Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered) {
-  by->make_safe(*item.last, [weak = weak_from_this(), &item, by, answered](const rr::Result<rr::Value>& result) {
+void SafeValues::send_item(Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered) {
+  item.open = Open::no;
+  const auto number = ++item.sendings;
+  by->make_safe(*item.last, [weak = weak_from_this(), &item, number, by,
+                             answered](const rr::Result<rr::Value>& result) {
     const auto self = weak.lock();
-    if (result || !self) return answered(result ? rr::Result<>() : rr::Result<>(result.error()));
-    const auto& path = item.action.path;
-    const bool is_locked = result.error().code == rr::ErrorCode::object_locked_error;
-    if (const auto holder = is_locked ? self->links_.locked_by(path) : nullptr; holder && holder != by) {
-      holder->forget_commands(path);
+    const auto answer = result ? rr::Result<>() : rr::Result<>(result.error());
+    if (!self) return answered(answer);
+    const bool is_locked = !result && result.error().code == rr::ErrorCode::object_locked_error;
+    if (const auto holder = is_locked ? self->links_.locked_by(item.action.path) : nullptr; holder && holder != by) {
+      holder->forget_commands(item.action.path);
       return self->send_item(item, holder, answered);
     }
-    self->handle_failed(item.action, *by, result.error());
-    answered(result.error());
+    if (!result && number == item.sendings) self->handle_failed(item, *by, result.error());
+    self->end_waiting();
+    answered(answer);
   });
 }
 
-void SafeValues::handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error) {
-  log(LogLevel::error, "the device did not take a safe value",
-      {{"device", device_}, {"member", action.path + "." + action.member}, {"error", error.message}});
-  if (by.is_lost()) return owe_again(action.path);
-  // connection_error: another gateway, before it ends our session, too
-  if (error.code == rr::ErrorCode::request_timeout || error.code == rr::ErrorCode::connection_error)
-    doubts_.push_back({action.path, by.number()});
-  if (error.code != rr::ErrorCode::object_locked_error) return;
-  refused_.push_back(action.path);
+void SafeValues::handle_failed(Item& item, const Upstream& by, const rr::Error& error) {
+  if (std::exchange(item.failure, error.message) != error.message)
+    log(LogLevel::error, "the device did not take a safe value",
+        {{"device", device_}, {"member", safe_member(item.action)}, {"error", error.message}});
+  if (by.is_lost()) {
+    owe(item);
+    if (item.open == Open::owed) links_.owed();
+    return;
+  }
+  item.upstream = by.number();
+  if (error.code == rr::ErrorCode::request_timeout) item.open = Open::unanswered;
+  // connection_error: another gateway has lost the device, and may have it again with our session as it is.
+  if (error.code != rr::ErrorCode::object_locked_error && error.code != rr::ErrorCode::connection_error) return;
+  item.open = Open::refused;
+  send_again_later(by.device());
+}
+
+void SafeValues::send_again_later(Device& device) {
+  if (again_) return;
+  if (!backoff_) backoff_.emplace(device.retry().min, device.retry().max);
+  again_.emplace(device.executor(), backoff_->next());
+  again_->async_wait([weak = weak_from_this()](const boost::system::error_code& cancelled) {
+    const auto self = weak.lock();
+    if (!cancelled && self) self->send_again();
+  });
+}
+
+void SafeValues::end_waiting() {
+  if (has_open(Open::refused)) return;
+  again_.reset();
+  backoff_.reset();
 }
 
 }  // namespace rrgate

@@ -1,6 +1,7 @@
 // What makes a service of a device safe when a lease ends. Layer: server/upstream. See docs/leases.md.
 #pragma once
 
+#include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,10 +11,12 @@
 #include <vector>
 
 #include "core/types/value.hpp"
+#include "node/driver/backoff.hpp"
 #include "server/config/config.hpp"
 
 namespace rrgate {
 
+class Device;
 class Upstream;
 
 /// A SafeAction in the types that the device has declared.
@@ -59,11 +62,11 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   /// Whether there are any at or below a path.
   bool has(std::string_view path) const;
   /// Whether some could not be sent yet, or may have to be sent again.
-  bool is_owing() const { return !owed_.empty() || !doubts_.empty() || !refused_.empty(); }
+  bool is_owing() const;
   void link(SafeLinks links) { links_ = std::move(links); }
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
-  /// they are sent as soon as there is one. So are those that a session which is lost later has not answered, and those
-  /// that the device refuses because of a lock as soon as one may be gone.
+  /// they are sent as soon as there is one. Those that the device has not taken then are sent again, see Open; not
+  /// where somebody has the lease by then.
   /// `by`  the session; where the device refuses that because of a lock, the one that has the lock follows it.
   /// `answered`  called once, when all are answered: the first error; connection_error: they could not be sent.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered = nullptr);
@@ -73,21 +76,26 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   void pay_around(std::string_view path, const std::shared_ptr<Upstream>& upstream);
   /// The session of the upstream with the device has ended.
   void handle_lost(std::uint64_t upstream);
-  /// A lock at the device was given back.
-  void handle_unlocked();
+  /// What was refused may be taken now: a lock at the device was given back.
+  void send_again();
 
  private:
+  /// Whether the device may not have taken what it was sent last, and when that is sent again.
+  enum class Open : std::uint8_t {
+    no,
+    unanswered,  ///< when the session has ended that has not answered in time
+    refused,     ///< after a while, or then: because of a lock, or by another gateway that has lost the device
+    owed,        ///< as soon as there is a session
+  };
   struct Item {
     SafeAction action;
     rr::Result<SafeRequest> request;
     std::optional<SafeRequest> last = {};  ///< that was good: for leases of before the object was released
     bool is_checked = false;               ///< looked at, well or not, since a session was opened
-  };
-  /// The device did not answer in time, or was lost behind another gateway, and what its session is worth is not known
-  /// yet.
-  struct Doubt {
-    std::string path;
-    std::uint64_t upstream = 0;
+    Open open = Open::no;
+    std::uint64_t upstream = 0;               ///< whose session has not answered, or was refused
+    std::uint64_t sendings = 0;               ///< only the answer to the last one counts
+    std::optional<std::string> failure = {};  ///< that was logged: not again with each sending
   };
 
   void look_up(std::size_t index, const std::shared_ptr<Upstream>& upstream);
@@ -95,16 +103,21 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   void take(Item& item, rr::Result<SafeRequest> request);
   bool is_checked(std::string_view path) const;
   void pay_due(const std::shared_ptr<Upstream>& upstream, const std::function<bool(const std::string&)>& is_due);
-  void send_item(const Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered);
-  void owe_again(const std::string& path);
-  void handle_failed(const SafeAction& action, const Upstream& by, const rr::Error& error);
+  void send_item(Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered);
+  void handle_failed(Item& item, const Upstream& by, const rr::Error& error);
+  /// Unless somebody has the lease: the end of that makes the object safe.
+  void owe(Item& item);
+  bool has_open(Open open) const;
+  void send_again_later(Device& device);
+  /// Where nothing is refused: a gateway that stops waits for no timer.
+  void end_waiting();
 
   std::string device_;
   std::vector<Item> items_;
   std::vector<std::string> owed_;  ///< paths of leases that have ended while there was no session
-  std::vector<Doubt> doubts_;
-  std::vector<std::string> refused_;  ///< paths of what the device has not taken because of a lock
   SafeLinks links_;
+  std::optional<boost::asio::steady_timer> again_;  ///< while anything is refused: until it is sent again
+  std::optional<rr::Backoff> backoff_;              ///< likewise
 };
 
 }  // namespace rrgate

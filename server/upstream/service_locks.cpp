@@ -315,7 +315,7 @@ void ServiceLocks::handle(LockAsked&& asked) {
     if (!self) return;
     self->table_.handle_answer(id, result ? rr::Result<>() : rr::Result<>(result.error()), steady_now());
     self->settle();
-    if (result && command == rr::LockCommand::unlock) self->safe_->handle_unlocked();
+    if (result && command == rr::LockCommand::unlock) self->safe_->send_again();
   };
   const auto upstream = upstreams_[asked.session].lock();
   if (!upstream) return answered(rr::make_error(rr::ErrorCode::connection_error, "the session has ended"));

@@ -287,8 +287,8 @@ def test_a_device_that_was_away_behind_another_gateway_is_made_safe_when_it_is_b
                 far.line.cut()
                 page.next(lease="plain", state="ended")
                 far.line.lead_to(port_of(far.url))
-                near.wait_until(lambda: "the device is back, and was made safe" in near.description())
-                wait_for(lambda: is_safe(arm))
+                near.wait_until(lambda: is_safe(arm))
+                near.wait_until(lambda: "was made safe" in near.description())
                 assert page.refusal("set", "speed", value=1)[0] == "ObjectLockedError"
         finally:
             near.stop()

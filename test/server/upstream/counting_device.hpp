@@ -84,14 +84,14 @@ inline LeaseConfig leases_with(const std::string& function) {
   return leases;
 }
 
-/// About a lease of the whole service, by `upstream`.
+/// About a lease, of the whole service if nothing else is said, by `upstream`.
 inline rr::ErrorCode ask_for_lease(UpstreamBench& bench, const std::shared_ptr<Upstream>& upstream,
                                    HearingClient& holder, rr::LockCommand command,
-                                   std::chrono::milliseconds deadman = 10s) {
+                                   std::chrono::milliseconds deadman = 10s, const std::string& path = "bench") {
   std::optional<rr::ErrorCode> answer;
   rr::LockWanted wanted;
   wanted.command = command;
-  wanted.path = "bench";
+  wanted.path = path;
   wanted.timeout = deadman;
   upstream->lock(holder, wanted,
                  [&](const rr::Result<>& result) { answer = result ? rr::ErrorCode::none : result.error().code; });
