@@ -91,7 +91,7 @@ void ServiceLocks::review(const UpstreamClient& client) {
     if (lease.holder != id) continue;
     if (!client.may_lock(lease.path))
       leases_.handle_lost(lease.path, "its holder has no right to it any more");
-    else if (!client.may_command(lease.path))  // it would renew it, and the device would go on
+    else if (holders_[lease.path].could_command && !client.may_command(lease.path))  // it would renew it for ever
       leases_.handle_lost(lease.path, "its holder may neither write nor call anything there any more");
   }
   settle();
@@ -175,6 +175,7 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
     const auto key = canonical_lock_path(wanted.path);
     auto& holder = holders_[key];
     holder.upstream = client.upstream_in_use();
+    holder.could_command = holder.could_command || client.may_command(key);
     if (!holder.end) holder.end = client.begin_lease_end(wanted.path);
     for (auto& lease : leases_.held())
       if (lease.path == key) device_.tell_lease({service_, std::move(lease), true, {}});

@@ -48,7 +48,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
   /// Gives back what the client has locked or leased, or waits for, where UpstreamClient::may_lock() says no by now;
-  /// and its leases where may_command() does.
+  /// and its leases where may_command() does so, and did not when they were taken.
   void review(const UpstreamClient& client);
   /// Whether the client has a lock, a monitor or a lease of this object, or has lost one and not given it back.
   bool has_at(const UpstreamClient& client, std::string_view path) const;
@@ -83,7 +83,8 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
  private:
   struct Holder {
     std::weak_ptr<Upstream> upstream;
-    AuditEntryPtr end;  ///< what is to be recorded of it
+    AuditEntryPtr end;           ///< what is to be recorded of it
+    bool could_command = false;  ///< when it took the lease; else that keeps others out
   };
 
   LeaseNeed need_of(std::string_view path, const rr::MemberDefinition& member) const;

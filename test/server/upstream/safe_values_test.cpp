@@ -563,6 +563,27 @@ TEST_CASE("what is owed to a device is sent before the commands of a new holder"
   CHECK(device.commands.front() == "stop");
 }
 
+TEST_CASE("a lease ends when its holder may command no more, but not where it was taken to keep others out") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with_stop());
+  bench.open();
+  HearingClient holder(bench.upstream);
+  holder.can_command = false;
+  const auto locks = bench.device->locks_of("bench");
+  take_lease(bench, bench.upstream, holder);
+  bench.upstream->review_locks(holder);
+  REQUIRE(locks->leases().size() == 1);
+  holder.can_command = true;
+  take_lease(bench, bench.upstream, holder);  // again
+  bench.upstream->review_locks(holder);
+  REQUIRE(locks->leases().size() == 1);
+  holder.can_command = false;
+  take_lease(bench, bench.upstream, holder);
+  CHECK(locks->leases().size() == 1);
+  bench.upstream->review_locks(holder);
+  CHECK(locks->leases().empty());
+}
+
 TEST_CASE("a session that rests is opened to make the device safe") {
   Counting device;
   UpstreamBench bench(device.service, leases_with_stop());

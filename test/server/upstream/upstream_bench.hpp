@@ -137,11 +137,13 @@ class HearingClient final : public UpstreamClient {
   std::function<void(rr::WirePacket&)> on_wire;
   std::function<void()> on_lease_ended;
   std::function<void(const rr::ClientConnection::CallbackReply&)> on_callback;  ///< none: it answers none
+  bool can_command = true;
   std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
 
  private:
   std::weak_ptr<const void> life() const override { return life_; }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
+  bool may_command(const std::string&) const override { return can_command; }
   void lease_ended(const std::string&, const std::string&) const override {
     if (on_lease_ended) on_lease_ended();
   }
