@@ -184,18 +184,19 @@ void SafeValues::pay_due(const std::shared_ptr<Upstream>& upstream,
   std::copy_if(owed_.begin(), owed_.end(), std::back_inserter(due), is_due);
   std::erase_if(owed_, is_due);
   for (const auto& path : due)
-    send(path, upstream, [device = device_, path](const rr::Result<>& answer) {
+    send(path, upstream, Why::lease_ended, [device = device_, path](const rr::Result<>& answer) {
       if (answer)
         log(LogLevel::warning, "the device is back, and was made safe: a lease had ended while it was away",
             {{"device", device}, {"path", path}});
     });
   for (auto& item : items_)
     if (item.open == Open::owed && is_due(item.action.path))
-      send_item(item, upstream, [device = device_, member = safe_member(item.action)](const rr::Result<>& answer) {
-        if (answer)
-          log(LogLevel::warning, "the device was made safe: it had not taken a safe value before",
-              {{"device", device}, {"member", member}});
-      });
+      send_item(item, upstream, Why::lease_ended,
+                [device = device_, member = safe_member(item.action)](const rr::Result<>& answer) {
+                  if (answer)
+                    log(LogLevel::warning, "the device was made safe: it had not taken a safe value before",
+                        {{"device", device}, {"member", member}});
+                });
 }
 
 bool SafeValues::is_owing() const {
@@ -225,7 +226,7 @@ void SafeValues::owe(Item& item) {
   item.open = links_.is_leased(item.action.path) ? Open::no : Open::owed;
 }
 
-bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered) {
+bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by, Why why, Answered answered) {
   if (!by || by->is_lost()) {
     if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
     links_.owed();
@@ -239,30 +240,48 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
   for (auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.last) continue;
     item.failure.reset();
+    item.refused_since.reset();
     answers->expect_one();
-    send_item(item, by, [answers](const rr::Result<>& answer) { answers->add(answer); });
+    send_item(item, by, why, [answers](const rr::Result<>& answer) { answers->add(answer); });
   }
   answers->add({});
   return !by->is_lost();
 }
 
-void SafeValues::send_item(Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered) {
+void SafeValues::send_item(Item& item, const std::shared_ptr<Upstream>& by, Why why, const Answered& answered) {
   item.open = Open::no;
   const auto number = ++item.sendings;
-  by->make_safe(*item.last, [weak = weak_from_this(), &item, number, by,
-                             answered](const rr::Result<rr::Value>& result) {
-    const auto self = weak.lock();
+  auto done = [weak = weak_from_this(), &item, number, by, why, answered](const rr::Result<rr::Value>& result) {
     const auto answer = result ? rr::Result<>() : rr::Result<>(result.error());
+    const auto self = weak.lock();
     if (!self) return answered(answer);
-    const bool is_locked = !result && result.error().code == rr::ErrorCode::object_locked_error;
-    if (const auto holder = is_locked ? self->links_.locked_by(item.action.path) : nullptr; holder && holder != by) {
+    const bool is_last = number == item.sendings;
+    const bool is_locked = !answer && answer.error().code == rr::ErrorCode::object_locked_error;
+    const bool may_follow = why == Why::stop || (is_last && !self->links_.is_leased(item.action.path));
+    const auto holder = is_locked && may_follow ? self->links_.locked_by(item.action.path) : nullptr;
+    if (holder && holder != by) {
+      note_refused(item, *by);
       holder->forget_commands(item.action.path);
-      return self->send_item(item, holder, answered);
+      return self->send_item(item, holder, why, answered);
     }
-    if (!result && number == item.sendings) self->handle_failed(item, *by, result.error());
-    self->end_waiting();
+    if (is_last) self->handle_answer(item, *by, answer);
     answered(answer);
-  });
+  };
+  by->make_safe(*item.last, std::move(done));
+}
+
+void SafeValues::note_refused(Item& item, const Upstream& by) {
+  item.upstream = by.number();
+  if (!item.refused_since) item.refused_since = std::chrono::steady_clock::now();
+}
+
+void SafeValues::handle_answer(Item& item, const Upstream& by, const rr::Result<>& answer) {
+  if (answer)
+    item.refused_since.reset();
+  else
+    handle_failed(item, by, answer.error());
+  end_waiting();
+  if (!has_open(Open::refused)) backoff_.reset();
 }
 
 void SafeValues::handle_failed(Item& item, const Upstream& by, const rr::Error& error) {
@@ -274,10 +293,21 @@ void SafeValues::handle_failed(Item& item, const Upstream& by, const rr::Error& 
     if (item.open == Open::owed) links_.owed();
     return;
   }
-  item.upstream = by.number();
-  if (error.code == rr::ErrorCode::request_timeout) item.open = Open::unanswered;
+  if (error.code == rr::ErrorCode::request_timeout) {
+    item.upstream = by.number();
+    item.open = Open::unanswered;
+    return;
+  }
   // connection_error: another gateway has lost the device, and may have it again with our session as it is.
-  if (error.code != rr::ErrorCode::object_locked_error && error.code != rr::ErrorCode::connection_error) return;
+  if (error.code == rr::ErrorCode::object_locked_error || error.code == rr::ErrorCode::connection_error)
+    note_refused(item, by);
+  else if (!item.refused_since || item.upstream == by.number())
+    return;  // else another session has its own reasons, as a right that its user lacks
+  if (std::chrono::steady_clock::now() - *item.refused_since > longest_refused) {
+    log(LogLevel::error, "the device may not be safe: it has not taken a safe value for too long",
+        {{"device", device_}, {"member", safe_member(item.action)}});
+    return;
+  }
   item.open = Open::refused;
   send_again_later(by.device());
 }
@@ -293,9 +323,7 @@ void SafeValues::send_again_later(Device& device) {
 }
 
 void SafeValues::end_waiting() {
-  if (has_open(Open::refused)) return;
-  again_.reset();
-  backoff_.reset();
+  if (!has_open(Open::refused)) again_.reset();
 }
 
 }  // namespace rrgate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -44,6 +45,11 @@ struct SafeLinks {
 class SafeValues : public std::enable_shared_from_this<SafeValues> {
  public:
   using Answered = std::function<void(const rr::Result<>&)>;
+  enum class Why : std::uint8_t { lease_ended, stop };
+
+  /// What a device has refused for so long because of a lock, it is not sent any more: it may keep the lock of a lost
+  /// session for ten minutes, and what comes much later would stop what somebody has begun since.
+  static constexpr std::chrono::minutes longest_refused{10};
 
   /// Those of `actions` that are about the service.
   SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions);
@@ -67,9 +73,10 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one. Those that the device has not taken then are sent again, see Open; not
   /// where somebody has the lease by then.
-  /// `by`  the session; where the device refuses that because of a lock, the one that has the lock follows it.
+  /// `by`  the session; where the device refuses that because of a lock, the one that has the lock follows it; what is
+  /// no stop not where somebody has the lease by then.
   /// `answered`  called once, when all are answered: the first error; connection_error: they could not be sent.
-  bool send(const std::string& path, const std::shared_ptr<Upstream>& by, Answered answered = nullptr);
+  bool send(const std::string& path, const std::shared_ptr<Upstream>& by, Why why, Answered answered = nullptr);
   /// Sends what could not be sent before, where it has been held against what the device is now.
   void pay(const std::shared_ptr<Upstream>& upstream);
   /// The same for what is owed at, above and below a path, at once: somebody is about to command there.
@@ -93,8 +100,9 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
     std::optional<SafeRequest> last = {};  ///< that was good: for leases of before the object was released
     bool is_checked = false;               ///< looked at, well or not, since a session was opened
     Open open = Open::no;
-    std::uint64_t upstream = 0;               ///< whose session has not answered, or was refused
-    std::uint64_t sendings = 0;               ///< only the answer to the last one counts
+    std::uint64_t upstream = 0;  ///< whose session has not answered, or was refused
+    std::uint64_t sendings = 0;  ///< only the answer to the last one counts
+    std::optional<std::chrono::steady_clock::time_point> refused_since = {};  ///< until it is taken, or sent anew
     std::optional<std::string> failure = {};  ///< that was logged: not again with each sending
   };
 
@@ -103,7 +111,9 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   void take(Item& item, rr::Result<SafeRequest> request);
   bool is_checked(std::string_view path) const;
   void pay_due(const std::shared_ptr<Upstream>& upstream, const std::function<bool(const std::string&)>& is_due);
-  void send_item(Item& item, const std::shared_ptr<Upstream>& by, const Answered& answered);
+  void send_item(Item& item, const std::shared_ptr<Upstream>& by, Why why, const Answered& answered);
+  static void note_refused(Item& item, const Upstream& by);
+  void handle_answer(Item& item, const Upstream& by, const rr::Result<>& answer);
   void handle_failed(Item& item, const Upstream& by, const rr::Error& error);
   /// Unless somebody has the lease: the end of that makes the object safe.
   void owe(Item& item);

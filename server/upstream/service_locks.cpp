@@ -188,7 +188,7 @@ void ServiceLocks::end_leases() {
   while (auto ended = leases_.poll_event()) {
     const auto holder = holders_.extract(ended->lease.path);
     const auto upstream = open_upstream(holder ? holder.mapped().upstream.lock() : nullptr);
-    const bool is_safe = safe_->send(ended->lease.path, upstream);
+    const bool is_safe = safe_->send(ended->lease.path, upstream, SafeValues::Why::lease_ended);
     const auto what = ended->why + (is_safe ? "" : "; the device is made safe when it is back");
     log(is_safe ? LogLevel::info : LogLevel::warning, "lease ended",
         {{"device", device_.config().name},
@@ -226,7 +226,7 @@ void ServiceLocks::make_safe(std::string_view path, std::function<void(const rr:
                                    " safe: the configuration of device " + rr::quote(device_.config().name) +
                                    " declares no \"leases\" with \"safe\" there"));
   safe_->send(
-      key, open_upstream(nullptr),
+      key, open_upstream(nullptr), SafeValues::Why::stop,
       [fits = safe_->check(key), done = std::move(done)](const rr::Result<>& answer) { done(answer ? fits : answer); });
 }
 

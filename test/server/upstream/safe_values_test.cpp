@@ -292,7 +292,7 @@ TEST_CASE("a safe value that a session had not answered when it was lost is sent
   Counting device;
   UpstreamBench bench(device.service, leases_with("wait"));
   const bool is_late = GENERATE(false, true);
-  if (is_late) answer_within(bench, 500ms);
+  if (is_late) answer_within(bench, 2s);
   bench.open();
   HearingClient holder(bench.upstream);
   take_lease(bench, bench.upstream, holder);
@@ -378,6 +378,32 @@ TEST_CASE("a safe value that waits to be sent again is sent at once by another s
   CHECK_FALSE(locks->is_owing());
 }
 
+TEST_CASE("a safe value that a lock keeps out is sent again though another session is refused for its own reasons") {
+  Counting device;
+  UpstreamBench bench(device.service, leases_with("wait"));
+  bench.set_retry({1h, 1h, 10s});
+  bench.open();
+  HearingClient holder(bench.upstream);
+  take_lease(bench, bench.upstream, holder);
+  leave_unanswered(bench, device, bench.upstream, holder);
+  const auto locks = bench.device->locks_of("bench");
+  const auto refuse = [&](rr::ErrorCode code) {
+    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+    std::exchange(device.waiting, std::nullopt)->fail({code, "not by you"});
+    bench.find("bench.others[1]");
+  };
+  refuse(rr::ErrorCode::object_locked_error);
+  const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
+  REQUIRE(bench.wait_for(own->open()).has_value());
+  refuse(rr::ErrorCode::permission_denied);
+  CHECK(locks->is_owing());
+  HearingClient next(bench.upstream);
+  take_lease(bench, bench.upstream, next);
+  refuse(rr::ErrorCode::permission_denied);  // by the session that the lock kept out
+  CHECK_FALSE(locks->is_owing());
+  own->close();
+}
+
 TEST_CASE("a safe value that is refused above another's lease is sent again without those that were taken") {
   StopsAndWait made;
   auto& [device, bench, holder] = static_cast<TwoStops&>(made);
@@ -431,7 +457,7 @@ TEST_CASE("a safe value that is in doubt when its session is closed is sent by o
   Counting device;
   UpstreamBench bench(device.service, leases_with("wait"));
   bench.open();
-  answer_within(bench, 500ms);
+  answer_within(bench, 2s);
   const auto own = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{}, UpstreamUse::one_client);
   REQUIRE(bench.wait_for(own->open()).has_value());
   const auto locks = bench.device->locks_of("bench");
