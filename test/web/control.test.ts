@@ -158,7 +158,8 @@ describe("control", () => {
       tell("held");
       await expect(fails()).rejects.toThrow("not now");
       expect(held.release).toHaveBeenCalledOnce();
-      expect(control.mayCommand).toBe(false);
+      expect(control.state.value).toMatchObject({ kind: "lost", byOthers: false });
+      await expect(control.begin()).rejects.toThrow("not now"); // by hand alone
     },
   );
   it("is left alone by a stop that a lock of this page keeps out: that is given up, and the stop is sent again", async () => {

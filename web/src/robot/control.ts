@@ -62,21 +62,21 @@ export class Control {
     return () => {
       this.#users -= 1;
       this.#isLeft = this.#users === 0;
-      if (this.#isLeft) this.giveUp();
+      if (this.#isLeft && this.#lease) this.release().catch(() => undefined); // ends with its session, too
     };
-  }
-
-  /** What is held is given back, so that the gateway makes the device safe: no right and no rate refuses that. */
-  giveUp(): void {
-    if (this.#lease) this.release().catch(() => undefined); // ends with its session, too
   }
 
   /** The connection or the device is gone, and with it what was held. */
   end(reason: string): void {
-    const lease = this.#lease;
     this.#isLeft = true;
+    this.giveUp(new Error(reason));
+  }
+
+  /** What is held is lost, and given back, so that the gateway makes the device safe: no right and no rate refuses that. */
+  giveUp(reason: unknown): void {
+    const lease = this.#lease;
     if (!lease) return;
-    this.#lose(new Error(reason));
+    this.#lose(reason);
     lease.release().catch(() => undefined); // ends with its session, too
   }
 
@@ -157,7 +157,7 @@ export function controlOf(object: Remote): Control {
  * A stop that is refused because somebody else has the lease: what this page commanded has been made safe by the gateway when
  * the lease went; where nobody gives leases, nothing has been made safe. Who `insists` takes it over, where one may, or takes it
  * where nobody has it any more, so that the gateway makes the device safe once more, and leaves it free.
- * Where a stop fails otherwise, as for rights or rates, this page gives its lease back, and the gateway makes the device safe; where
+ * Where a stop fails otherwise, as for rights or rates, this page loses its lease, and the gateway makes the device safe; where
  * the gateway does not confirm the lease, it does so by itself.
  * @throws (rejects) with what `stop` failed with.
  */
@@ -171,7 +171,7 @@ export async function stopNow(
   } catch (error) {
     const control = object.controls.get(object.path);
     if (!isLocked(error)) {
-      if (control?.state.value.kind === "held") control.giveUp();
+      if (control?.state.value.kind === "held") control.giveUp(error);
       throw error;
     }
     if (await object.locks.giveUp(object.path)) return stopNow(object, insists, stop);
