@@ -3,7 +3,6 @@
 
 import { t } from "../app/language";
 import { isReplay } from "../gateway/devices";
-import "../styles/devices.css";
 
 /** Nothing at a device that plays no recording. */
 export function RecordingMark({ device }: { device: string }) {
