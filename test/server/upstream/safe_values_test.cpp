@@ -230,7 +230,7 @@ TEST_CASE("what makes a device safe is its last command, whatever a client has s
   const std::vector<SafeAction> actions{{SafeAction::Kind::call, "bench", "stop", "[]"}};
   const auto safe = std::make_shared<SafeValues>("device", "bench", actions);
   safe->handle_opened(bench.upstream);
-  CHECK(safe->send("bench", bench.upstream));
+  CHECK(safe->send("bench", bench.upstream, SafeValues::Why::lease_ended));
   const auto before = device.commands.size();
   REQUIRE(bench.run_until([&] { return device.commands.size() >= before + 2; }));
   bench.find("bench");  // whatever else there is has been sent by then
