@@ -3,10 +3,10 @@ import json
 import shutil
 import time
 
+from golden_recording import DEADLINE, FILE, MESSAGES, plain
 from http_api import ask
 from json_sockets import Socket
 from recordings import API, begin_gateway, create, listed, wait_for  # noqa: F401 (fixtures)
-from test_replay import DEADLINE, FILE, MESSAGES, plain
 from users import basic, make_users
 
 NAME = "create.Create.20261125T083000123Z"

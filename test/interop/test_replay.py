@@ -8,28 +8,11 @@ import queue
 import subprocess
 
 import pytest
-from mcap.reader import make_reader
 
 from clients import JS
 from gateways import RRGATE
-from processes import ROOT, Background
-
-FILE = ROOT / "test" / "golden" / "recordings" / "create.mcap"
-DEADLINE = 20.0  # seconds
-
-
-def read_messages():
-    """[(kind, member, time stamp in ns, what the document holds)], as the mcap package reads them."""
-    with open(FILE, "rb") as file:
-        reader = make_reader(file, validate_crcs=True)
-        [service] = [each for each in reader.iter_metadata() if each.name == "robotraconteur.service"]
-        found = [(channel.metadata["kind"], channel.topic.rsplit("/", 1)[1], message.publish_time, json.loads(message.data))
-                 for _, channel, message in reader.iter_messages(log_time_order=False)]
-    assert service.metadata["type"] == "experimental.simulatedcreate.SimulatedCreate"
-    return [(kind, member, stamp, document if kind == "event" else document["value"]) for kind, member, stamp, document in found]
-
-
-MESSAGES = read_messages()
+from golden_recording import DEADLINE, FILE, MESSAGES, plain
+from processes import Background
 
 
 @pytest.fixture
@@ -53,17 +36,6 @@ def test_the_recording_is_what_it_was():
     assert [stamp for stamp, _ in states] == sorted(stamp for stamp, _ in states)
     assert states[0][1]["x"] == 0 and states[-1][1]["x"] > 0.5
     assert [member for kind, member, *_ in MESSAGES if kind == "event"] == ["Bump"]
-
-
-def plain(value):
-    """A value of the real package as the recording has it."""
-    if hasattr(value, "dtype"):
-        return base64.b64encode(bytes(value)).decode() if value.dtype == "uint8" else value.tolist()
-    if isinstance(value, list):
-        return [plain(each) for each in value]
-    if type(value).__module__.startswith("RobotRaconteur"):
-        return {name: plain(getattr(value, name)) for name in dir(value) if not name.startswith(("_", "rr"))}
-    return value
 
 
 def test_the_real_package_gets_each_message_after_its_step(node, start_replay):
