@@ -69,10 +69,6 @@ bool fits(const AccessRule& rule, const AccessRequest& what) {
          fits(rule.members, what.member);
 }
 
-AccessRequest to_record(const RecordedPlace& played) {
-  return {.device = played.device, .service = played.service, .verb = Verb::record};
-}
-
 /// A device that plays a recording is used by the rights to what was recorded; its other service, which controls it,
 /// is for those who may record that.
 AccessRequest as_recorded(AccessRequest what) {

@@ -1,10 +1,12 @@
-// The names of devices that play recordings: they say what was recorded, by whose rights they are used. Layer:
-// server/access.
+// The names of recordings, and of devices that play them: they say what was recorded, by whose rights both are used.
+// Layer: server/access.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "server/access/access_rules.hpp"
 
 namespace rrgate {
 
@@ -21,19 +23,31 @@ constexpr bool is_replay(std::string_view device) {
   return device.starts_with(replay_prefix);
 }
 
+/// What "create.Create.20261125T083000123Z" says; borrows that.
 struct RecordedPlace {
   std::string_view device;
-  std::string_view service;
+  std::string_view service = {};
+  std::string_view begin = {};
 };
+
+/// nullopt: it has no three parts. What they hold is not looked at.
+inline std::optional<RecordedPlace> split_recording_name(std::string_view name) {
+  const auto begin = name.rfind('.');
+  const auto service = begin == std::string_view::npos ? begin : name.substr(0, begin).rfind('.');
+  if (service == std::string_view::npos) return std::nullopt;
+  return RecordedPlace{name.substr(0, service), name.substr(service + 1, begin - service - 1), name.substr(begin + 1)};
+}
 
 /// What a device plays, as its name says; borrows that. nullopt: the device plays no recording.
 inline std::optional<RecordedPlace> played_by(std::string_view device) {
   if (!is_replay(device)) return std::nullopt;
   device.remove_prefix(replay_prefix.size());
-  const auto time = device.rfind('.');
-  const auto service = time == std::string_view::npos ? time : device.substr(0, time).rfind('.');
-  if (service == std::string_view::npos) return RecordedPlace{device, {}};
-  return RecordedPlace{device.substr(0, service), device.substr(service + 1, time - service - 1)};
+  return split_recording_name(device).value_or(RecordedPlace{device});
+}
+
+/// What who controls the playing of it asks for.
+inline AccessRequest to_record(const RecordedPlace& played) {
+  return {.device = played.device, .service = played.service, .verb = Verb::record};
 }
 
 }  // namespace rrgate

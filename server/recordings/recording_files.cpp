@@ -49,13 +49,10 @@ std::string format_recording_name(const RecordingName& name) {
 }
 
 std::optional<RecordingName> parse_recording_name(std::string_view name) {
-  const auto last = name.rfind('.');
-  if (last == std::string_view::npos) return std::nullopt;
-  const auto begin = time_of_name(name.substr(last + 1));
-  const auto middle = name.substr(0, last).rfind('.');
-  if (!begin || middle == std::string_view::npos || middle == 0 || middle + 1 == last) return std::nullopt;
-  return RecordingName{std::string(name.substr(0, middle)), std::string(name.substr(middle + 1, last - middle - 1)),
-                       *begin};
+  const auto said = split_recording_name(name);
+  const auto begin = said ? time_of_name(said->begin) : std::nullopt;
+  if (!begin || said->device.empty() || said->service.empty()) return std::nullopt;
+  return RecordingName{std::string(said->device), std::string(said->service), *begin};
 }
 
 std::string first_file_of(std::string_view recording) {

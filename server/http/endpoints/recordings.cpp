@@ -231,9 +231,7 @@ std::string names_of_replays(GatewayState& gateway, const Identity& who) {
   std::string out;
   std::size_t others = 0;
   for (const auto& device : gateway.recordings().replays().list()) {
-    const auto played = played_by(device);
-    const AccessRequest wanted{.device = played->device, .service = played->service, .verb = Verb::record};
-    if (gateway.access().state().rules.check(who, wanted))
+    if (gateway.access().state().rules.check(who, to_record(*played_by(device))))
       out += (out.empty() ? "" : ", ") + device;
     else
       ++others;
