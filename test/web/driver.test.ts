@@ -38,10 +38,15 @@ describe("driver", () => {
     return { calls, send };
   }
 
-  function connected(): { calls: Call[]; driver: Driver<DriveCommand> } {
+  interface Right {
+    mayCommand: boolean;
+    begin: () => Promise<void>;
+  }
+
+  function connected(right?: Right): { calls: Call[]; driver: Driver<DriveCommand> } {
     const { calls, send } = connection();
     const driver = makeDriver();
-    driver.setConnection({ send });
+    driver.setConnection(right ? { send, right } : { send });
     return { calls, driver };
   }
 
@@ -58,10 +63,8 @@ describe("driver", () => {
     expect(calls.map((c) => c.command)).toEqual([GO, TURN]);
   });
   it("asks for the right to move again where a stop that has just been answered took it away", async () => {
-    const { calls, send } = connection();
-    const driver = makeDriver();
     const right = rightToMove();
-    driver.setConnection({ send, right });
+    const { calls, driver } = connected(right);
     driver.want(GO);
     await calls[0]?.answer();
     driver.stop();
@@ -74,10 +77,8 @@ describe("driver", () => {
     expect(calls.map((c) => c.command)).toEqual([GO, STOP, TURN]);
   });
   it("stops once the right to move was given back, and moves by a new wish alone", async () => {
-    const { calls, send } = connection();
-    const driver = makeDriver();
     const right = rightToMove();
-    driver.setConnection({ send, right });
+    const { calls, driver } = connected(right);
     driver.want(GO);
     await calls[0]?.answer();
     right.mayCommand = false;
@@ -91,10 +92,8 @@ describe("driver", () => {
     expect(calls.map((c) => c.command)).toEqual([GO, STOP, GO]);
   });
   it("drops a wish that waited for an answer while the right to move was given back", async () => {
-    const { calls, send } = connection();
-    const driver = makeDriver();
     const right = rightToMove();
-    driver.setConnection({ send, right });
+    const { calls, driver } = connected(right);
     driver.want(GO);
     driver.want(TURN);
     right.mayCommand = false;
@@ -105,11 +104,9 @@ describe("driver", () => {
   it.each(["answered", "lost"])(
     "sends no wish while the right to it is asked for, where a stop was %s",
     async (stop) => {
-      const { calls, send } = connection();
-      const driver = makeDriver();
       let give: () => void = () => undefined;
       const right = { mayCommand: true, begin: () => new Promise<void>((resolve) => (give = resolve)) };
-      driver.setConnection({ send, right });
+      const { calls, driver } = connected(right);
       driver.want(GO);
       await calls[0]?.answer();
       driver.stop();

@@ -47,6 +47,15 @@ struct Recorded {
     service.definitions = {text};
     service.objects = {{"Robot", "com.x.Robot"}};
   }
+  RecordingWriter write(const std::string& path, RecordingOptions options = {}) {
+    auto writer = RecordingWriter::create(path, std::move(options)).value();
+    add_to(writer);
+    return writer;
+  }
+  void add_to(RecordingWriter& writer) {
+    service.label = "Robot";
+    REQUIRE(writer.add_service(service));
+  }
   std::uint16_t add(RecordingWriter& writer, const char* member) {
     return writer.add_member(service, "Robot", "", *robot->find_member(member), named).value();
   }
@@ -110,9 +119,7 @@ TEST_CASE("a file that is large enough is followed by the next, which stands for
   RecordingOptions options;
   options.max_bytes = 20'000;
   options.kept_files = 2;
-  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"), options);
   const auto pose = robot.add(writer, "pose");
   for (int i = 0; i < 1000; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
   REQUIRE(writer.close());
@@ -137,9 +144,7 @@ TEST_CASE("the files that follow leave those of an earlier recording alone, unle
     RecordingOptions options;
     options.max_bytes = 20'000;
     options.replaces = replaces;
-    auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-    robot.service.label = "Robot";
-    REQUIRE(writer.add_service(robot.service));
+    auto writer = robot.write(folder.path("a.mcap"), options);
     const auto pose = robot.add(writer, "pose");
     for (int i = 0; writer.path() == folder.path("a.mcap"); ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
     REQUIRE(writer.close());
@@ -207,9 +212,7 @@ TEST_CASE("documentation without end is no part of a schema") {
 TEST_CASE("a clock that is set back stops no time") {
   const test::Folder folder;
   Recorded robot;
-  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"));
   const auto pose = robot.add(writer, "pose");
   for (const int seconds : {100, 101, 50, 51, 52, 40, 41, 108, 109})
     REQUIRE(writer.write(pose, value(seconds), {}, {seconds, 0}));
@@ -227,9 +230,7 @@ TEST_CASE("a file whose index takes too much memory is followed by the next") {
   Recorded robot;
   RecordingOptions options;
   options.max_index_bytes = 1000;
-  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"), options);
   const auto pose = robot.add(writer, "pose");
   for (int i = 0; i < 100; ++i) {
     REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
@@ -253,9 +254,7 @@ TEST_CASE("a file holds more than the definitions and schemas, however low the l
   Recorded robot;
   RecordingOptions options;
   options.max_bytes = 100;
-  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"), options);
   const auto pose = robot.add(writer, "pose");
   const auto before = writer.size();
   const auto least = writer.least_file_bytes();
@@ -288,8 +287,7 @@ TEST_CASE("files of former runs count among those that are kept, and go when the
   CHECK(std::filesystem::exists(folder.path("1.mcap")));
   CHECK(recorded_ring(folder.path("a.mcap")) == "mine");
   Recorded robot;
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  robot.add_to(writer);
   const auto pose = robot.add(writer, "pose");
   CHECK(writer.kept().size() == 4);
   CHECK(std::filesystem::exists(folder.path("1.mcap")));
@@ -315,9 +313,7 @@ TEST_CASE("files of former runs count among those that are kept, and go when the
 TEST_CASE("a recording that is not wanted any more is read no further") {
   const test::Folder folder;
   Recorded robot;
-  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"));
   REQUIRE(writer.close());
   std::stop_source unwanted;
   CHECK(Recording::open(writer.path(), unwanted.get_token()).has_value());
@@ -343,9 +339,7 @@ TEST_CASE("what is no recording says so") {
 TEST_CASE("a message that is not what it should be names its place") {
   const test::Folder folder;
   Recorded robot;
-  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
-  robot.service.label = "Robot";
-  REQUIRE(writer.add_service(robot.service));
+  auto writer = robot.write(folder.path("a.mcap"));
   const auto pose = robot.add(writer, "pose");
   REQUIRE(writer.write(pose, {{"other", 1}}, {}, {1, 0}));
   REQUIRE(writer.close());

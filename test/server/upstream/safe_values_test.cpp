@@ -17,6 +17,15 @@ class Believing final : public rr::Authenticator {
   }
 };
 
+/// The device has got the call "wait", and refuses it.
+void refuse_wait(UpstreamBench& bench, Counting& device, rr::Error why) {
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  std::exchange(device.waiting, std::nullopt)->fail(std::move(why));
+}
+
+/// As another gateway does that has lost the device.
+const rr::Error lost_behind{rr::ErrorCode::connection_error, "connection_lost: device 'arm'"};
+
 /// A device that wants users, the gateway's own session with it, which is that of "gateway", and one of "alice".
 struct Guarded {
   Counting device;
@@ -37,10 +46,7 @@ struct Guarded {
     REQUIRE(ask_for_lease(bench, by, holder, command) == rr::ErrorCode::none);
   }
   /// The device has got a safe value, and refuses it because of a lock.
-  void refuse_locked() {
-    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-    std::exchange(device.waiting, std::nullopt)->fail({rr::ErrorCode::object_locked_error, "Object locked by gateway"});
-  }
+  void refuse_locked() { refuse_wait(bench, device, {rr::ErrorCode::object_locked_error, "Object locked by gateway"}); }
 
  private:
   static std::shared_ptr<rr::Service> service_with_users(Counting& device) {
@@ -98,10 +104,7 @@ struct StopsAndWait : TwoStops {
     count_stops();
   }
 
-  void fail(rr::ErrorCode code) {
-    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-    std::exchange(device.waiting, std::nullopt)->fail({code, "not now"});
-  }
+  void fail(rr::ErrorCode code) { refuse_wait(bench, device, {code, "not now"}); }
   /// All that were sent before.
   std::size_t count_stops() {
     bench.find("bench.others[1]");
@@ -317,7 +320,7 @@ TEST_CASE("a safe value that was lost behind another gateway is sent by the sess
   take_lease(bench, bench.upstream, holder);
   leave_unanswered(bench, device, bench.upstream, holder);
   const auto asked = bench.ask(holder, rr::CallKind::property_get, "bench", "number");
-  std::exchange(device.waiting, std::nullopt)->fail({rr::ErrorCode::connection_error, "connection_lost: device 'arm'"});
+  refuse_wait(bench, device, lost_behind);
   REQUIRE(bench.run_until([&] { return asked->has_value(); }));
   cut(bench, bench.upstream);
   bench.open();
@@ -334,9 +337,7 @@ TEST_CASE("a safe value that another gateway could not pass on is sent again tho
   leave_unanswered(bench, device, bench.upstream, holder);
   const auto locks = bench.device->locks_of("bench");
   const auto refuse = [&] {
-    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-    std::exchange(device.waiting, std::nullopt)
-        ->fail({rr::ErrorCode::connection_error, "connection_lost: device 'arm'"});
+    refuse_wait(bench, device, lost_behind);
     REQUIRE(bench.run_until([&] { return locks->is_owing(); }));
   };
   for (int i = 0; i < 3; ++i) refuse();
@@ -369,7 +370,7 @@ TEST_CASE("a safe value that waits to be sent again is sent at once by another s
     take_lease(bench, own, holder);
     leave_unanswered(bench, device, own, holder);
   }
-  std::exchange(device.waiting, std::nullopt)->fail({rr::ErrorCode::connection_error, "connection_lost: device 'arm'"});
+  refuse_wait(bench, device, lost_behind);
   REQUIRE(bench.run_until([&] { return locks->is_owing(); }));
   own->close();
   REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
@@ -388,8 +389,7 @@ TEST_CASE("a safe value that a lock keeps out is sent again though another sessi
   leave_unanswered(bench, device, bench.upstream, holder);
   const auto locks = bench.device->locks_of("bench");
   const auto refuse = [&](rr::ErrorCode code) {
-    REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
-    std::exchange(device.waiting, std::nullopt)->fail({code, "not by you"});
+    refuse_wait(bench, device, {code, "not by you"});
     bench.find("bench.others[1]");
   };
   refuse(rr::ErrorCode::object_locked_error);
