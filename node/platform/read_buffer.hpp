@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <span>
 
 #include "node/platform/page_buffer.hpp"
@@ -27,7 +27,7 @@ class ReadBuffer {
     if (!wants_large_)
       large_.reset();
     else if (!large_)
-      large_.emplace(large_size_);
+      large_ = std::make_unique<PageBuffer>(large_size_);
     return room();
   }
   /// The same as before.
@@ -46,7 +46,7 @@ class ReadBuffer {
 
  private:
   const std::size_t large_size_;
-  std::optional<PageBuffer> large_;
+  std::unique_ptr<PageBuffer> large_;
   std::array<std::uint8_t, small_size> small_;
   bool wants_large_ = false;
   unsigned small_reads_ = 0;  ///< in a row

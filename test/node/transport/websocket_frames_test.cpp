@@ -99,7 +99,7 @@ TEST_CASE("what RFC 6455 forbids is an error with its code") {
   const auto refuses = [](rr::Bytes bytes, WebSocketViolation violation, std::uint16_t code) {
     WebSocketDecoder decoder(WebSocketRole::server);
     boost::system::error_code error;
-    decoder.decode(bytes, error);
+    (void)decoder.decode(bytes, error);
     CHECK(error == violation);
     CHECK(decoder.close_code() == code);
   };
