@@ -189,11 +189,7 @@ Result<> decode_v2(ByteSpan bytes, const DecodeOptions& options, Message& messag
     read_entry(in, options, message);
     in.set_limit(bytes.size());
   }
-  if (in.ok() && in.left() != 0)
-    in.fail(ErrorCode::protocol_error, "EntryCount", in.at(),
-            std::to_string(in.left()) + " bytes left behind the last of " + std::to_string(entry_count) + " entries");
-  if (!in.ok()) return in.take_error();
-  return {};
+  return end_entries(in, entry_count);
 }
 
 Result<> encode_v2(const Message& message, const EncodeOptions& options, EncodedMessage& encoded) {

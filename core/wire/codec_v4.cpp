@@ -428,11 +428,7 @@ Result<> decode_v4(ByteSpan bytes, const DecodeOptions& options, Message& messag
     reading.read_entry(message);
     in.set_limit(bytes.size());
   }
-  if (in.ok() && in.left() != 0)
-    in.fail(ErrorCode::protocol_error, "EntryCount", in.at(),
-            std::to_string(in.left()) + " bytes left behind the last of " + std::to_string(entry_count) + " entries");
-  if (!in.ok()) return in.take_error();
-  return {};
+  return end_entries(in, entry_count);
 }
 
 Result<> encode_v4(const Message& message, const EncodeOptions& options, EncodedMessage& encoded) {

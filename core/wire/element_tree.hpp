@@ -37,6 +37,15 @@ inline void check_count(ByteReader& in, std::size_t at, std::uint32_t count, std
             std::to_string(count) + " cannot fit into the " + std::to_string(in.left()) + " bytes left");
 }
 
+/// Nothing may follow the last entry of a message. Returns   what has failed in it, if anything has.
+inline Result<> end_entries(ByteReader& in, std::uint32_t entry_count) {
+  if (in.ok() && in.left() != 0)
+    in.fail(ErrorCode::protocol_error, "EntryCount", in.at(),
+            std::to_string(in.left()) + " bytes left behind the last of " + std::to_string(entry_count) + " entries");
+  if (!in.ok()) return in.take_error();
+  return {};
+}
+
 /// Rules 12 and 14: takes the data of a leaf, which must fill the element exactly.
 inline void read_leaf_data(ByteReader& in, std::size_t count_at, MessageElement& element) {
   const std::size_t left = in.left();
