@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/session/service_path.hpp"
+#include "server/upstream/lock_path.hpp"
 
 namespace rrgate {
 

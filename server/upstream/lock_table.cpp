@@ -3,63 +3,23 @@
 #include <algorithm>
 
 #include "core/session/service_path.hpp"
+#include "server/upstream/lock_path.hpp"
 
 namespace rrgate {
 
 namespace {
 
 constexpr std::size_t max_locks = 1024;
-constexpr std::size_t max_monitors = 1024;
-constexpr std::size_t max_waiting = 1024;  ///< for one monitor
-/// The device forgets a monitor whose owner was idle for 30 s. A little earlier here: an owner that is refused in vain
-/// is better than two that are not.
-constexpr std::chrono::seconds idle_timeout{25};
 
 rr::Error locked(std::string why) {
   return {rr::ErrorCode::object_locked_error, std::move(why)};
 }
 
-rr::Error invalid(std::string why) {
-  return {rr::ErrorCode::invalid_operation, std::move(why)};
-}
-
-rr::Error too_late() {
-  return {rr::ErrorCode::operation_timeout, "the monitor lock was not free in time"};
-}
-
-rr::Error already_entering() {
-  return invalid("Already acquiring or acquired monitor lock");
-}
-
-/// Nobody knows whether the device has done it, or will.
-bool is_unknown(const rr::Result<>& result) {
-  return !result && result.error().code == rr::ErrorCode::request_timeout;
-}
-
-/// "01" and "+1" may name the same object as "1". A string key that is such a text is taken for another one, which
-/// keeps out too many, not too few.
-std::string canonical_index(std::string_view index) {
-  const bool has_sign = !index.empty() && (index.front() == '+' || index.front() == '-');
-  auto digits = index.substr(has_sign ? 1 : 0);
-  const auto is_digit = [](char each) { return each >= '0' && each <= '9'; };
-  if (digits.empty() || !std::all_of(digits.begin(), digits.end(), is_digit)) return std::string(index);
-  while (digits.size() > 1 && digits.front() == '0') digits.remove_prefix(1);
-  return (index.front() == '-' && digits != "0" ? "-" : "") + std::string(digits);
+std::string name_of_holder(const Subject& by) {
+  return by.is_nobody() ? "another client" : by.name;
 }
 
 }  // namespace
-
-std::string canonical_lock_path(std::string_view path) {
-  const auto segments = rr::parse_service_path(path);
-  if (!segments) return std::string(path);
-  std::string canonical;
-  for (const auto& [name, index] : *segments) {
-    std::optional<std::string> text;
-    if (index) text = canonical_index(*index);
-    canonical = canonical.empty() ? name : rr::child_path(canonical, name, text);
-  }
-  return canonical;
-}
 
 // --- clients ---
 
@@ -137,6 +97,10 @@ void LockTable::answer(LockClient client, rr::LockRequestId request, rr::Result<
 
 // --- the device ---
 
+bool LockTable::is_unknown(const rr::Result<>& result) {
+  return !result && result.error().code == rr::ErrorCode::request_timeout;
+}
+
 void LockTable::ask(Hold& hold, Asking what, LockSession session, rr::LockCommand command,
                     std::chrono::milliseconds timeout) {
   hold.asking = what;
@@ -189,9 +153,8 @@ void LockTable::handle_released(std::string_view path, rr::TimePoint) {
   }
   for (auto& [key, monitor] : monitors_) {
     if (!rr::is_within(key, canonical) || monitor.asking != Asking::nothing) continue;
-    const auto session = monitor.session;
     lose_monitor(monitor, why);
-    ask(monitor, Asking::give_back, session, rr::LockCommand::exit_monitor);
+    take_back_monitor(monitor, 0);
   }
 }
 
@@ -344,137 +307,7 @@ void LockTable::lock_answered(Locks::iterator at, const rr::Result<>& result) {
   end_leaving(leaver);
 }
 
-// --- monitors ---
-
-void LockTable::enter(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now) {
-  const auto key = canonical_lock_path(wanted.path);
-  handle_timeout(now);
-  const auto never = rr::TimePoint::max();
-  const Waiting waiting{client, wanted.id, wanted.path, wanted.timeout.count() < 0 ? never : now + wanted.timeout};
-  const auto found = monitors_.find(key);
-  if (found == monitors_.end()) {
-    if (monitors_.size() >= max_monitors)
-      return answer(client, wanted.id,
-                    rr::make_error(rr::ErrorCode::out_of_system_resource, "too many objects are monitor locked"));
-    lost_monitors_.erase({client, key});
-    return begin_entering(monitors_[key], waiting, now);
-  }
-  auto& monitor = found->second;
-  const bool is_waiting = std::any_of(monitor.queue.begin(), monitor.queue.end(),
-                                      [client](const Waiting& other) { return other.client == client; });
-  if (monitor.owner == client || is_waiting) return answer(client, wanted.id, already_entering());
-  lost_monitors_.erase({client, key});
-  if (wanted.timeout.count() == 0) return answer(client, wanted.id, too_late());
-  if (monitor.queue.size() >= max_waiting)
-    return answer(client, wanted.id,
-                  rr::make_error(rr::ErrorCode::out_of_system_resource, "too many clients wait for this monitor lock"));
-  monitor.queue.push_back(waiting);
-}
-
-void LockTable::begin_entering(Monitor& monitor, const Waiting& waiting, rr::TimePoint now) {
-  const auto& party = parties_.at(waiting.client);
-  monitor.owner = monitor.asker = waiting.client;
-  monitor.session = party.session;
-  monitor.by = party.user;
-  monitor.path = waiting.path;
-  monitor.request = waiting.request;
-  const auto left = waiting.deadline == rr::TimePoint::max()
-                        ? std::chrono::milliseconds(-1)
-                        : std::chrono::ceil<std::chrono::milliseconds>(waiting.deadline - now);
-  ask(monitor, Asking::take, party.session, rr::LockCommand::enter_monitor, left);
-}
-
-void LockTable::exit(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now) {
-  const auto key = canonical_lock_path(wanted.path);
-  handle_timeout(now);
-  if (lost_monitors_.erase({client, key}) > 0) return answer(client, wanted.id, {});
-  const auto found = monitors_.find(key);
-  if (found == monitors_.end()) return answer(client, wanted.id, {});
-  auto& monitor = found->second;
-  const auto is_his = [client](const Waiting& waiting) { return waiting.client == client; };
-  if (const auto waiting = std::find_if(monitor.queue.begin(), monitor.queue.end(), is_his);
-      waiting != monitor.queue.end()) {
-    answer(client, waiting->request, invalid("Not acquiring monitor lock"));
-    monitor.queue.erase(waiting);
-  }
-  if (monitor.owner != client || monitor.asking != Asking::nothing) {
-    answer(client, wanted.id, invalid("Not monitor locked"));
-    if (monitor.owner == client && monitor.asking == Asking::take) {
-      answer(client, monitor.request, invalid("Not acquiring monitor lock"));
-      take_back_monitor(monitor, 0);
-    }
-    return;
-  }
-  monitor.asker = client;
-  monitor.request = wanted.id;
-  ask(monitor, Asking::give_back, monitor.session, wanted.command);
-}
-
-/// From one who is gone, or has had enough.
-void LockTable::take_back_monitor(Monitor& monitor, LockClient leaver) {
-  monitor.owner = monitor.asker = 0;
-  monitor.leaver = leaver;
-  if (monitor.asking == Asking::nothing)
-    ask(monitor, Asking::give_back, monitor.session, rr::LockCommand::exit_monitor);
-}
-
-void LockTable::lose_monitor(Monitor& monitor, const std::string& why) {
-  if (monitor.owner != 0) lost_monitors_[{monitor.owner, canonical_lock_path(monitor.path)}] = why;
-  monitor.owner = 0;
-}
-
-void LockTable::hand_on(Monitors::iterator at, rr::TimePoint now) {
-  auto& queue = at->second.queue;
-  while (!queue.empty()) {
-    const auto next = std::move(queue.front());
-    queue.pop_front();
-    if (now < next.deadline) return begin_entering(at->second, next, now);
-    answer(next.client, next.request, too_late());
-  }
-  monitors_.erase(at);
-}
-
-void LockTable::monitor_answered(Monitors::iterator at, const rr::Result<>& result, rr::TimePoint now) {
-  auto& monitor = at->second;
-  const auto was = std::exchange(monitor.asking, Asking::nothing);
-  const auto asker = std::exchange(monitor.asker, 0);
-  answer(asker, monitor.request, result);
-  if (was == Asking::take && result && monitor.owner != 0) {
-    monitor.idle_deadline = now + idle_timeout;
-    return;
-  }
-  if (was == Asking::take && (result || is_unknown(result))) return take_back_monitor(monitor, monitor.leaver);
-  if (is_unknown(result)) events_.push_back(LockSessionInDoubt{monitor.session});
-  const auto leaver = std::exchange(monitor.leaver, 0);
-  monitor.owner = 0;
-  hand_on(at, now);
-  end_leaving(leaver);
-}
-
-/// Owners that do nothing lose their monitor; who waits is told that it is too late.
-void LockTable::handle_timeout(rr::TimePoint now) {
-  for (auto& [key, monitor] : monitors_) {
-    std::erase_if(monitor.queue, [&](const Waiting& waiting) {
-      const bool is_late = waiting.deadline <= now;
-      if (is_late) answer(waiting.client, waiting.request, too_late());
-      return is_late;
-    });
-    if (monitor.owner == 0 || monitor.asking != Asking::nothing || now < monitor.idle_deadline) continue;
-    lose_monitor(monitor, "its owner was idle");
-    take_back_monitor(monitor, 0);
-  }
-}
-
-rr::TimePoint LockTable::poll_timeout() const {
-  auto next = rr::TimePoint::max();
-  for (const auto& [key, monitor] : monitors_) {
-    for (const auto& waiting : monitor.queue) next = std::min(next, waiting.deadline);
-    if (monitor.owner != 0 && monitor.asking == Asking::nothing) next = std::min(next, monitor.idle_deadline);
-  }
-  return next;
-}
-
-// --- requests of members ---
+// --- what is asked ---
 
 bool LockTable::is_empty() const {
   return locks_.empty() && monitors_.empty() && lost_locks_.empty() && lost_monitors_.empty();
@@ -496,25 +329,14 @@ rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_
   if (!is_exempt) {
     const auto lock = find_covering(key);
     if (lock != locks_.end() && lock->second.owner != 0 && !owns(client, lock->second))
-      return locked("Object locked by " + (lock->second.by.is_nobody() ? "another client" : lock->second.by.name));
+      return locked("Object locked by " + name_of_holder(lock->second.by));
     for (auto lost = lost_locks_.lower_bound({client, ""}); lost != lost_locks_.end() && lost->first.first == client;
          ++lost)
       if (rr::is_within(key, lost->first.second))
         return locked("the lock of " + rr::quote(lost->first.second) +
                       " is not this client's any more: " + lost->second + "; unlock it, or lock it again");
   }
-  const auto found = monitors_.find(key);
-  if (found != monitors_.end()) {
-    auto& monitor = found->second;
-    if (monitor.owner != 0 && monitor.asking == Asking::nothing && now >= monitor.idle_deadline) handle_timeout(now);
-    if (monitor.owner != 0 && monitor.owner != client)
-      return invalid("Object is currently monitor locked. Use MonitorEnter to obtain monitor lock");
-    if (monitor.owner == client) monitor.idle_deadline = now + idle_timeout;
-  }
-  if (const auto lost = lost_monitors_.find({client, key}); lost != lost_monitors_.end())
-    return invalid("the monitor lock of " + rr::quote(key) + " is not this client's any more: " + lost->second +
-                   "; exit it, or enter it again");
-  return {};
+  return check_monitor(client, key, now);
 }
 
 rr::Result<> LockTable::check_below(LockClient client, std::string_view path) const {
@@ -523,8 +345,7 @@ rr::Result<> LockTable::check_below(LockClient client, std::string_view path) co
     for (auto at = held.lower_bound(key + "."); at != held.end() && rr::is_within(at->first, key); ++at) {
       const Hold& hold = at->second;
       if (hold.owner == 0 || owns(client, hold)) continue;
-      return locked(rr::quote(at->first) + ", which is below, is locked by " +
-                    (hold.by.is_nobody() ? "another client" : hold.by.name));
+      return locked(rr::quote(at->first) + ", which is below, is locked by " + name_of_holder(hold.by));
     }
     return {};
   };

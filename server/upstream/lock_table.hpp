@@ -148,6 +148,8 @@ class LockTable {
   /// What a client holds no more without having given it back, and why. By canonical path.
   using Lost = std::map<std::pair<LockClient, std::string>, std::string>;
 
+  /// Nobody knows whether the device has done it, or will.
+  static bool is_unknown(const rr::Result<>& result);
   bool owns(LockClient client, const Hold& lock) const;
   Locks::iterator find_covering(std::string_view path);
   void ask(Hold& hold, Asking what, LockSession session, rr::LockCommand command,
@@ -161,6 +163,7 @@ class LockTable {
   void take_back_lock(Hold& lock, LockClient leaver);
   void lock_answered(Locks::iterator at, const rr::Result<>& result);
 
+  rr::Result<> check_monitor(LockClient client, const std::string& key, rr::TimePoint now);
   void enter(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now);
   void exit(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now);
   void begin_entering(Monitor& monitor, const Waiting& waiting, rr::TimePoint now);
@@ -178,8 +181,5 @@ class LockTable {
   std::uint64_t last_ask_ = 0;
   std::deque<LockEvent> events_;
 };
-
-/// One spelling of a path for all that name the same object, whatever they escape.
-std::string canonical_lock_path(std::string_view path);
 
 }  // namespace rrgate

@@ -7,7 +7,7 @@
 #include "server/json/value_from_json.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/device.hpp"
-#include "server/upstream/lock_table.hpp"
+#include "server/upstream/lock_path.hpp"
 #include "server/upstream/upstream.hpp"
 
 namespace rrgate {

@@ -5,6 +5,7 @@
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
 #include "server/log/log.hpp"
+#include "server/upstream/lock_path.hpp"
 #include "server/upstream/upstream.hpp"
 
 namespace rrgate {

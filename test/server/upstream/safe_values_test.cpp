@@ -1,6 +1,7 @@
 // What makes a device safe when a lease ends: when it is sent, by which session, and before what.
 #include "server/upstream/safe_values.hpp"
 
+#include "server/upstream/lock_path.hpp"
 #include "test/server/upstream/counting_device.hpp"
 
 using namespace rrgate;
