@@ -299,6 +299,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::int32_t index = 0;
   };
 
+  /// For what is answered when the upstream has gone.
+  static rr::Error session_has_ended();
   rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(std::string username,
                                                                                    bool is_stepwise);
   rr::awaitable<rr::Result<>> log_in(std::shared_ptr<rr::ClientConnection> connection);
