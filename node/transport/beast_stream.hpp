@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/support/utf8.hpp"
 #include "node/transport/byte_stream.hpp"
 #include "node/transport/watchdog.hpp"
 
@@ -77,7 +78,7 @@ class BeastStream final : public ByteStream {
   awaitable<void> end(const EndReason& reason) override {
     close_limit_.arm(std::chrono::seconds(1));
     const boost::beast::websocket::close_reason why(static_cast<boost::beast::websocket::close_code>(reason.code),
-                                                    reason.text.substr(0, 123));
+                                                    std::string(utf8_prefix(reason.text, 123)));
     co_await websocket_.async_close(why, await_tuple);
     close_limit_.disarm();
     close();

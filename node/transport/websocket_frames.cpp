@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/support/random.hpp"
+#include "core/support/utf8.hpp"
 #include "node/tls/base64.hpp"
 #include "node/tls/digest.hpp"
 
@@ -201,11 +202,7 @@ Bytes make_control_frame(WebSocketRole role, WebSocketOpcode opcode, ByteSpan pa
 
 Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view reason) {
   if (!is_sendable_code(code)) return make_control_frame(role, WebSocketOpcode::close, {});
-  if (reason.size() > 123) {
-    std::size_t end = 123;
-    while (end > 0 && (static_cast<unsigned char>(reason[end]) & 0xc0) == 0x80) --end;
-    reason = reason.substr(0, end);
-  }
+  reason = utf8_prefix(reason, 123);
   Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
   payload.insert(payload.end(), reason.begin(), reason.end());
   return make_control_frame(role, WebSocketOpcode::close, payload);

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "core/support/hex.hpp"
+#include "core/support/utf8.hpp"
 #include "node/platform/utc_time.hpp"
 #include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
@@ -44,7 +45,7 @@ std::string format_audit_time(std::chrono::system_clock::time_point now) {
 std::string format_audit_event(const AuditEvent& event, std::chrono::system_clock::time_point now) {
   auto out = rr::OrderedJson::object();
   const auto add = [&out](std::string_view key, std::string_view text) {
-    if (!text.empty()) rr::add_key(out, key) = std::string(text.substr(0, longest_text));
+    if (!text.empty()) rr::add_key(out, key) = std::string(rr::utf8_prefix(text, longest_text));
   };
   add("time", format_audit_time(now));
   add("event", event.event);

@@ -10,6 +10,7 @@
 
 #include "core/session/connection.hpp"
 #include "core/support/random.hpp"
+#include "core/support/utf8.hpp"
 #include "node/driver/post_cancel.hpp"
 #include "node/transport/race.hpp"
 #include "server/log/log.hpp"
@@ -77,9 +78,7 @@ std::string_view to_string(DeviceState state) {
 std::string quotable(std::string_view message) {
   constexpr std::size_t longest = 400;
   if (message.size() <= longest) return std::string(message);
-  auto end = longest;
-  while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xc0) == 0x80) --end;  // no half character
-  return std::string(message.substr(0, end)) + "...";
+  return std::string(rr::utf8_prefix(message, longest)) + "...";
 }
 
 Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole,

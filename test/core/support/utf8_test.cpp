@@ -37,6 +37,13 @@ TEST_CASE("broken and overlong forms are not UTF-8") {
   }
 }
 
+TEST_CASE("text is cut between characters") {
+  const std::string text = "a\xc3\xa9\xe2\x82\xac";  // of 1, 2 and 3 bytes
+  const std::size_t kept[] = {0, 1, 1, 3, 3, 3, 6, 6};
+  for (std::size_t limit = 0; limit < 8; ++limit) CHECK(utf8_prefix(text, limit) == text.substr(0, kept[limit]));
+  CHECK(utf8_prefix("\x80\x80\x80", 2).empty());
+}
+
 TEST_CASE("utf8: code points of one to four bytes", "[support]") {
   std::string out;
   for (const std::uint32_t code : {0x7fu, 0x80u, 0x7ffu, 0x800u, 0xffffu, 0x10000u, 0x10ffffu}) {

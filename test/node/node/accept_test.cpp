@@ -143,6 +143,34 @@ TEST_CASE("a peer that takes what it is sent slowly, but takes it, is not given 
   CHECK_FALSE(failed);
 }
 
+TEST_CASE("the reason that a Beast WebSocket ends with is cut between characters") {
+  asio::io_context io;
+  tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.1"), 0});
+  tcp::socket client(io);
+  client.connect(acceptor.local_endpoint());
+  beast::websocket::stream<beast::tcp_stream> server{beast::tcp_stream(acceptor.accept())};
+  beast::websocket::stream<tcp::socket> peer(std::move(client));
+  const std::string fits(122, 'a');
+  const auto serve = [&]() -> awaitable<void> {
+    co_await server.async_accept(await_tuple);
+    const auto stream = make_beast_stream(std::move(server));
+    const EndReason reason{1011, fits + "\xc3\xa4"};
+    co_await stream->end(reason);
+  };
+  error_code ended;
+  const auto hear = [&]() -> awaitable<void> {
+    co_await peer.async_handshake("robot.lab", "/", await_tuple);
+    std::array<char, 16> into{};
+    const auto [error, bytes] = co_await peer.async_read_some(asio::buffer(into), await_tuple);
+    ended = error;
+  };
+  asio::co_spawn(io, serve, asio::detached);
+  asio::co_spawn(io, hear, asio::detached);
+  io.run_for(std::chrono::seconds(20));
+  CHECK(ended == beast::websocket::error::closed);
+  CHECK(std::string_view(peer.reason().reason.data(), peer.reason().reason.size()) == fits);
+}
+
 TEST_CASE("a connection is refused for a URL that is none, and let go by a node that stops") {
   asio::io_context io;
   Node node(io, "test.node");

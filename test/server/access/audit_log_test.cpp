@@ -123,6 +123,8 @@ TEST_CASE("a record of the audit log says who did what, when") {
   CHECK(text.find('\n') == std::string::npos);
   CHECK(text.size() < 1000);
   CHECK(nlohmann::json::parse("{" + text + "}")["detail"] == "why");
+  const auto cut = format_audit_event({.event = "login_failed", .detail = std::string(499, 'x') + "\xc3\xa4"}, now);
+  CHECK(nlohmann::json::parse("{" + cut + "}")["detail"] == std::string(499, 'x'));
 }
 
 TEST_CASE("the hash of a record is that of its text behind the hash before") {
