@@ -119,8 +119,7 @@ awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   const auto& received = decoder_.received_close();
   if (!is_broken_ && !splitter_.is_in_frame() && (takes_close_ || received || decoder_.has_seen_control())) {
-    auto frame =
-        received ? make_close_frame(role_, received->code, {}) : make_close_frame(role_, reason.code, reason.text);
+    auto frame = make_close_frame(role_, received, reason.code, reason.text);
     close_limit_.arm(stream_close_time);
     co_await write_control(std::move(frame));
     close_limit_.disarm();

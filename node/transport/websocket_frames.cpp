@@ -136,10 +136,7 @@ void WebSocketDecoder::end_control() {
   has_seen_control_ = true;
   if (opcode_ == WebSocketOpcode::ping) ping_ = control_;
   if (opcode_ != WebSocketOpcode::close) return;
-  close_.emplace();
-  if (control_.size() < 2) return;
-  close_->code = static_cast<std::uint16_t>(control_[0] << 8 | control_[1]);
-  close_->reason = std::string(as_text(ByteSpan(control_).subspan(2)));
+  close_ = read_close_frame(control_);
 }
 
 std::optional<Bytes> WebSocketDecoder::take_ping() {
@@ -206,6 +203,16 @@ Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view 
   Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
   payload.insert(payload.end(), reason.begin(), reason.end());
   return make_control_frame(role, WebSocketOpcode::close, payload);
+}
+
+Bytes make_close_frame(WebSocketRole role, const std::optional<CloseFrame>& received, std::uint16_t code,
+                       std::string_view reason) {
+  return received ? make_close_frame(role, received->code, {}) : make_close_frame(role, code, reason);
+}
+
+CloseFrame read_close_frame(ByteSpan payload) {
+  if (payload.size() < 2) return {};
+  return {static_cast<std::uint16_t>(payload[0] << 8 | payload[1]), std::string(as_text(payload.subspan(2)))};
 }
 
 FrameSplitter::Frame FrameSplitter::begin_frame(std::size_t payload) const {

@@ -105,6 +105,11 @@ FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload, const
 Bytes make_control_frame(WebSocketRole role, WebSocketOpcode opcode, ByteSpan payload);
 /// A close frame; `reason` is cut after 123 bytes, at a UTF-8 boundary. Code 1005 makes an empty one.
 Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view reason);
+/// The last frame of a connection: the answer to a close frame of the peer, where one has come, else a frame of one's
+/// own.
+Bytes make_close_frame(WebSocketRole role, const std::optional<CloseFrame>& received, std::uint16_t code,
+                       std::string_view reason);
+CloseFrame read_close_frame(ByteSpan payload);
 
 /// Lays slices out as binary frames of at most max_frame_payload bytes. A server's payload stays where it is; a
 /// client's frames are made in a buffer, one behind the other. A frame that was written in part goes on with whatever

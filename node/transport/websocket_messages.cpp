@@ -113,10 +113,7 @@ Result<> WebSocketMessageDecoder::end_frame() {
       ping_ = control_;
       return {};
     case WebSocketOpcode::close:
-      close_.emplace();
-      if (control_.size() < 2) return {};
-      close_->code = static_cast<std::uint16_t>(control_[0] << 8 | control_[1]);
-      close_->reason = std::string(as_text(ByteSpan(control_).subspan(2)));
+      close_ = read_close_frame(control_);
       return {};
     default:
       if (in_message_) return {};
@@ -216,9 +213,7 @@ awaitable<error_code> WebSocketMessages::write_raw(std::span<const ByteSpan> sli
 awaitable<void> WebSocketMessages::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   if (!is_broken_) {
-    const auto& received = decoder_.received_close();
-    const auto frame = received ? make_close_frame(WebSocketRole::server, received->code, {})
-                                : make_close_frame(WebSocketRole::server, reason.code, reason.text);
+    const auto frame = make_close_frame(WebSocketRole::server, decoder_.received_close(), reason.code, reason.text);
     const ByteSpan slice(frame);
     const std::span<const ByteSpan> slices(&slice, 1);
     close_limit_.arm(message_close_time);

@@ -216,6 +216,13 @@ TEST_CASE("control frames are cut to their bound") {
   CHECK(cut.size() == 2 + 2 + 122);
 }
 
+TEST_CASE("a close frame is answered with its code; where none has come, the reason is told") {
+  const auto own = make_close_frame(WebSocketRole::server, std::nullopt, 1001, "bye");
+  CHECK(own == make_close_frame(WebSocketRole::server, 1001, "bye"));
+  const CloseFrame received{1000, "done"};
+  CHECK(make_close_frame(WebSocketRole::server, received, 1001, "bye") == rr::Bytes{0x88, 2, 0x03, 0xe8});
+}
+
 TEST_CASE("the accept value of RFC 6455's example") {
   CHECK(websocket_accept("dGhlIHNhbXBsZSBub25jZQ==") == "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");
 }
