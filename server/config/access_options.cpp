@@ -30,13 +30,6 @@ auto read_pattern(std::vector<std::string>& patterns) {
   };
 }
 
-auto read_file(std::vector<std::string>& files) {
-  return [&files](const std::string& text) -> std::string {
-    files.push_back(text);
-    return text.empty() ? "empty; expected the name of a file" : "";
-  };
-}
-
 bool is_header_name(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
@@ -51,12 +44,11 @@ void read_jwt(ObjectReader& in, JwtConfig& jwt) {
   in.text("user_claim", jwt.claims.user_claim);
   in.text("roles_claim", jwt.claims.roles_claim);
   in.flag("discover", jwt.discovers);
-  in.texts("ca", false, read_file(jwt.ca));
+  in.files("ca", jwt.ca);
   if (!jwt.jwks_file.empty() + !jwt.secret_file.empty() + jwt.discovers != 1)
     in.finding("jwks_file", "expected either jwks_file, secret_file or discover: what tokens are checked with");
   if (jwt.discovers && !jwt.claims.issuer.starts_with("https://"))
-    in.finding("issuer",
-               "found " + rr::quote(jwt.claims.issuer) + ", expected the https:// URL where its keys are found");
+    in.finding("issuer", wrong_text(jwt.claims.issuer, "the https:// URL where its keys are found"));
   if (!jwt.ca.empty() && !jwt.discovers) in.finding("ca", "nothing is fetched; expected discover beside it");
 }
 
@@ -64,7 +56,7 @@ void read_identity_headers(ObjectReader& in, IdentityHeaders& headers) {
   in.text("user", headers.user);
   in.text("roles", headers.roles);
   for (const auto& [key, name] : {std::pair("user", &headers.user), std::pair("roles", &headers.roles)})
-    if (!is_header_name(*name)) in.finding(key, "found " + rr::quote(*name) + ", expected the name of a header");
+    if (!is_header_name(*name)) in.finding(key, wrong_text(*name, "the name of a header"));
   if (headers.user.empty()) in.finding("user", "missing; expected the name of a header");
 }
 
@@ -94,9 +86,7 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
   in.texts("members", false, read_pattern(rule.members));
   in.texts("may", true, [&](const std::string& text) -> std::string {
     const auto verb = parse_verb(text);
-    if (!verb)
-      return "found " + rr::quote(text) +
-             ", expected one of: read, write, call, subscribe, lock, record, serve, metrics, admin";
+    if (!verb) return wrong_text(text, "one of: read, write, call, subscribe, lock, record, serve, metrics, admin");
     rule.may.push_back(*verb);
     return {};
   });
@@ -128,8 +118,8 @@ void read_access(ObjectReader& in, AccessConfig& access) {
   in.text("tokens_file", access.tokens_file);
   in.object("jwt", [&](ObjectReader& part) { read_jwt(part, access.jwt); });
   in.text("ticket_key_file", access.ticket_key_file);
-  in.texts("client_ca", false, read_file(access.clients.ca));
-  in.texts("client_crl", false, read_file(access.clients.crl));
+  in.files("client_ca", access.clients.ca);
+  in.files("client_crl", access.clients.crl);
   in.object("identity_headers", [&](ObjectReader& part) { read_identity_headers(part, access.identity_headers); });
   in.text("anonymous_role", access.anonymous_role);
   if (!access.anonymous_role.empty())

@@ -19,17 +19,10 @@ namespace {
 constexpr std::int64_t hour_ms = 3'600'000;
 
 void read_node(ObjectReader& in, NodeConfig& node) {
-  std::string id;
   in.text("name", node.name);
-  in.text("id", id);
   if (!rr::is_valid_node_name(node.name))
-    in.finding("name", "found " + rr::quote(node.name) + ", expected letters, digits, '_', '-', '.', a letter first");
-  if (id.empty()) return;
-  const auto parsed = rr::parse_node_id(id);
-  if (parsed && !parsed->is_any())
-    node.id = *parsed;
-  else
-    in.finding("id", "found " + rr::quote(id) + ", expected a UUID that is not all zeros");
+    in.finding("name", wrong_text(node.name, "letters, digits, '_', '-', '.', a letter first"));
+  in.node_id("id", node.id);
 }
 
 void read_tls(ObjectReader& in, TlsConfig& tls) {
@@ -46,12 +39,10 @@ void read_tls(ObjectReader& in, TlsConfig& tls) {
 void read_proxy(ObjectReader& in, Config& config) {
   in.text("base_path", config.base_path);
   if (!is_path_prefix(config.base_path))
-    in.finding("base_path",
-               "found " + rr::quote(config.base_path) + ", expected a path as \"/robots\", without '/' at its end");
+    in.finding("base_path", wrong_text(config.base_path, "a path as \"/robots\", without '/' at its end"));
   in.texts("trusted_proxies", false, [&](const std::string& text) -> std::string {
     const auto range = parse_address_range(text);
-    if (!range)
-      return "found " + rr::quote(text) + ", expected an address or a range as \"10.0.0.0/8\", no bits set behind it";
+    if (!range) return wrong_text(text, "an address or a range as \"10.0.0.0/8\", no bits set behind it");
     config.proxy.trust.proxies.push_back(*range);
     return {};
   });
@@ -140,15 +131,13 @@ void read_config(ObjectReader& in, Config& config) {
   in.text("web_root", config.web_root);
   read_proxy(in, config);
   in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {
-    if (!is_origin_pattern(text))
-      return "found " + rr::quote(text) + ", expected scheme://host[:port] or scheme://*.domain[:port]";
+    if (!is_origin_pattern(text)) return wrong_text(text, "scheme://host[:port] or scheme://*.domain[:port]");
     config.allowed_origins.push_back(text);
     return {};
   });
   in.texts("allowed_hosts", false, [&](const std::string& text) -> std::string {
     if (!is_host_pattern(text))
-      return "found " + rr::quote(text) +
-             ", expected a name as \"mybox.local\" or \"*.domain\", without scheme and port";
+      return wrong_text(text, "a name as \"mybox.local\" or \"*.domain\", without scheme and port");
     config.allowed_hosts.push_back(text);
     return {};
   });

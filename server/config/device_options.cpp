@@ -36,14 +36,8 @@ void read_way(ObjectReader& in, DeviceConfig& device) {
   }
   in.objects("headers", false, [&](ObjectReader& item) {
     std::pair<std::string, std::string> header;
-    item.required_text("name", [&](const std::string& text) -> std::string {
-      header.first = text;
-      return {};
-    });
-    item.required_text("value", [&](const std::string& text) -> std::string {
-      header.second = text;
-      return {};
-    });
+    item.required_text("name", header.first);
+    item.required_text("value", header.second);
     if (!header.first.empty() && !rr::is_extra_header(header.first, header.second))
       item.finding("name", "header " + rr::quote(header.first) +
                                " can't be added: the upgrade sets it itself, or its name or value has a character that "
@@ -59,10 +53,7 @@ void read_mode(ObjectReader& in, DeviceMode& mode) {
 }
 
 void read_login(ObjectReader& in, UpstreamLogin& login) {
-  in.required_text("username", [&](const std::string& text) -> std::string {
-    login.username = text;
-    return {};
-  });
+  in.required_text("username", login.username);
   in.required_text("password", [&](const std::string& text) -> std::string {
     login.credentials.items.emplace_back("password", rr::Value(text));
     return {};
@@ -70,10 +61,7 @@ void read_login(ObjectReader& in, UpstreamLogin& login) {
 }
 
 void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
-  in.required_text("member", [&](const std::string& text) -> std::string {
-    rule.member = text;
-    return {};
-  });
+  in.required_text("member", rule.member);
   std::string answer = "owner";
   in.choice("answer", answer, {"owner", "first", "all"});
   rule.policy = answer == "first" ? CallbackPolicy::first
@@ -82,26 +70,17 @@ void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
 }
 
 void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
-  std::string node_id;
   in.text("node_name", rule.node_name);
-  in.text("node_id", node_id);
+  const bool has_node_id = in.node_id("node_id", rule.node_id);
   in.text("service_type", rule.service_type);
   const auto is_glob_char = [](char c) {
     return std::string_view("*?._-").find(c) != std::string_view::npos || std::isalnum(static_cast<unsigned char>(c));
   };
   if (!std::all_of(rule.node_name.begin(), rule.node_name.end(), is_glob_char))
-    in.finding("node_name", "found " + rr::quote(rule.node_name) +
-                                ", expected the letters, digits, '_', '-', '.' of node names, '*' or '?'");
-  if (!node_id.empty()) {
-    const auto id = rr::parse_node_id(node_id);
-    if (id && !id->is_any())
-      rule.node_id = *id;
-    else
-      in.finding("node_id", "found " + rr::quote(node_id) + ", expected a UUID that is not all zeros");
-  } else if (rule.node_name.empty() && rule.service_type.empty()) {
+    in.finding("node_name", wrong_text(rule.node_name, "the letters, digits, '_', '-', '.' of node names, '*' or '?'"));
+  if (!has_node_id && rule.node_name.empty() && rule.service_type.empty())
     in.finding("node_name",
                "missing; a rule needs one of node_name, node_id and service_type (\"node_name\": \"*\" allows all)");
-  }
 }
 
 }  // namespace
@@ -113,7 +92,7 @@ std::string check_device_name(const std::string& name) {
   const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
   if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
       !std::all_of(name.begin(), name.end(), is_name_char))
-    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
+    return wrong_text(name, "1 to 64 letters, digits, '_', '-', '.', first a letter or digit");
   return {};
 }
 
@@ -148,7 +127,7 @@ void read_discover(ObjectReader& in, Discover& discover) {
   std::vector<std::string> scopes;
   in.texts("scopes", false, [&](const std::string& text) -> std::string {
     if (text != "node_local" && text != "link_local" && text != "site_local" && text != "ipv4_broadcast")
-      return "found " + rr::quote(text) + ", expected one of: node_local, link_local, site_local, ipv4_broadcast";
+      return wrong_text(text, "one of: node_local, link_local, site_local, ipv4_broadcast");
     scopes.push_back(text);
     return {};
   });

@@ -30,7 +30,7 @@ void read_safe_action(ObjectReader& in, SafeAction& action) {
     action.kind = kind;
     const auto dot = text.rfind('.');
     if (dot == std::string::npos || dot == 0 || dot + 1 == text.size())
-      return in.finding(key, "found " + rr::quote(text) + ", expected path.member, as \"Create.Drive\"");
+      return in.finding(key, wrong_text(text, "path.member, as \"Create.Drive\""));
     action.path = text.substr(0, dot);
     action.member = text.substr(dot + 1);
   };

@@ -57,6 +57,10 @@ std::string pointer_segment(std::string_view key) {
 
 }  // namespace
 
+std::string wrong_text(std::string_view found, std::string_view expected) {
+  return "found " + rr::quote(found) + ", expected " + std::string(expected);
+}
+
 std::string format_finding(const std::string& file, const Finding& finding) {
   return file + ": " + (finding.path.empty() ? std::string() : finding.path + ": ") + finding.text;
 }
@@ -144,12 +148,19 @@ void ObjectReader::choice(std::string_view key, std::string& target, std::vector
   }
   std::string expected;
   for (const auto& name : choices) expected += (expected.empty() ? "" : ", ") + name;
-  finding(key, "found " + rr::quote(text) + ", expected one of: " + expected);
+  finding(key, wrong_text(text, "one of: " + expected));
 }
 
 void ObjectReader::required_text(std::string_view key, const ReadText& read) {
   const auto* value = find(key, "string", {.path = {}, .type = {}, .is_required = true});
   if (value) item_text(*value, path_ + pointer_segment(key), read);
+}
+
+void ObjectReader::required_text(std::string_view key, std::string& target) {
+  required_text(key, [&target](const std::string& text) -> std::string {
+    target = text;
+    return {};
+  });
 }
 
 void ObjectReader::item_text(const nlohmann::json& value, const std::string& path, const ReadText& read) {
@@ -170,6 +181,18 @@ void ObjectReader::texts(std::string_view key, bool is_required, const ReadText&
       log_.findings.push_back({item_path, "found " + shown((*value)[i]) + ", expected a string"});
     }
   }
+}
+
+bool ObjectReader::node_id(std::string_view key, rr::NodeId& target) {
+  std::string given;
+  text(key, given);
+  if (given.empty()) return false;
+  const auto id = rr::parse_node_id(given);
+  if (id && !id->is_any())
+    target = *id;
+  else
+    finding(key, wrong_text(given, "a UUID that is not all zeros"));
+  return true;
 }
 
 void ObjectReader::required_file(std::string_view key, std::string& target) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/support/node_id.hpp"
 #include "server/config/finding.hpp"
 
 namespace rrgate {
@@ -26,6 +27,9 @@ struct IntegerRange {
   std::int64_t minimum;
   std::int64_t maximum;
 };
+
+/// What is wrong with a text: "found 'x', expected " and what was.
+std::string wrong_text(std::string_view found, std::string_view expected);
 
 class ObjectReader {
  public:
@@ -43,7 +47,11 @@ class ObjectReader {
   /// `read` turns the text into something else and returns what is wrong with it, or "".
   using ReadText = std::function<std::string(const std::string&)>;
   void required_text(std::string_view key, const ReadText& read);
+  /// Any text, also an empty one.
+  void required_text(std::string_view key, std::string& target);
   void texts(std::string_view key, bool is_required, const ReadText& read);
+  /// A UUID that is not all zeros. Returns   whether there is a text, right or wrong.
+  bool node_id(std::string_view key, rr::NodeId& target);
   /// Names of files, none of them empty.
   void required_file(std::string_view key, std::string& target);
   void files(std::string_view key, std::vector<std::string>& target);
