@@ -33,17 +33,18 @@ asio::ip::address_v6 group(std::uint8_t scope, unsigned zone) {
   return asio::ip::address_v6(bytes, zone);
 }
 
-/// Interfaces that are members of the group, by whichever socket. Nullopt: the system does not tell.
-std::optional<std::set<unsigned>> members_of(const asio::ip::address_v6& wanted) {
+/// Each group of IPv6, in hex, with an interface that is a member of it, by whichever socket.
+using Memberships = std::set<std::pair<std::string, unsigned>>;
+
+/// Nullopt: the system does not tell.
+std::optional<Memberships> read_memberships() {
   std::ifstream in("/proc/self/net/igmp6");
   if (!in) return std::nullopt;
-  const auto bytes = wanted.to_bytes();
-  const auto text = hex_text(bytes);
-  std::set<unsigned> members;
+  Memberships out;
   unsigned interface = 0;
   for (std::string name, address, rest; in >> interface >> name >> address && std::getline(in, rest);)
-    if (address == text) members.insert(interface);
-  return members;
+    out.emplace(std::move(address), interface);
+  return out;
 }
 
 /// Where a datagram went, as IPV6_RECVPKTINFO tells; any where it does not.
@@ -177,12 +178,13 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
     std::set<unsigned> present;
     for (const auto& address : addresses_)
       if (address.address.is_v6()) present.insert(address.interface_index);
+    const auto memberships = read_memberships();
     bool has_lost = false;
     for (const auto scope : group_scopes(scopes_)) {
-      const auto members = members_of(group(scope, 0));
+      const auto address = hex_text(group(scope, 0).to_bytes());
       for (const auto interface : present) {
         const bool is_new = !v6_->joined.contains(interface);
-        if (!is_new && (!members || members->contains(interface))) continue;
+        if (!is_new && (!memberships || memberships->contains({address, interface}))) continue;
         error_code error;  // an interface without multicast
         // One whose IPv6 was off, if only for a moment, has lost its memberships, but may not join a second time.
         v6_->socket.set_option(asio::ip::multicast::leave_group(group(scope, 0), interface), error);
