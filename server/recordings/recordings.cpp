@@ -195,7 +195,7 @@ void Recordings::begin_standing(const std::vector<RecordingWish>& missing, std::
   for (std::size_t i = 0; i < missing.size(); ++i) {
     const auto& wish = missing[i];
     if (std::find(wanted.begin(), wanted.end(), wish) == wanted.end()) continue;  // not any more
-    forget_ended(&wish);
+    forget_failed(wish);
     auto& ring = rings[i];
     for (std::error_code error; !ring.empty() && folder.bytes >= config_.recordings.max_bytes; ring.pop_front()) {
       folder.forget(ring.front());
@@ -209,11 +209,14 @@ void Recordings::begin_standing(const std::vector<RecordingWish>& missing, std::
     log(LogLevel::error, "recordings can't begin", {{"error", problem}});
 }
 
-void Recordings::forget_ended(const RecordingWish* failed) {
+void Recordings::forget_failed(const RecordingWish& wish) {
   std::erase_if(runs_, [&](const auto& each) {
     const auto& run = *each.second;
-    return !run.writer && failed && run.wish == *failed && run.info.messages == 0;
+    return !run.writer && run.wish == wish && run.info.messages == 0;
   });
+}
+
+void Recordings::forget_oldest() {
   while (static_cast<std::size_t>(std::count_if(runs_.begin(), runs_.end(),
                                                 [](const auto& each) { return !each.second->writer; })) > most_ended) {
     auto oldest = runs_.end();
@@ -244,11 +247,30 @@ rr::awaitable<rr::Result<std::string>> Recordings::begin(RecordingWish wish) {
 }
 
 rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, Paths* ring) {
-  const auto& limits = config_.recordings;
-  if (limits.folder.empty())
+  if (const auto possible = check_wish(wish); !possible) return possible.error();
+  auto run = std::make_unique<Run>();
+  run->wish = wish;
+  run->folder = config_.recordings.folder;
+  run->info.device = wish.device;
+  run->info.service = wish.service;
+  run->info.is_standing = ring != nullptr;
+  if (const auto opened = open_file(*run, ring); !opened) return opened.error();
+  const RecorderOptions options{wish.members, wish.interval};
+  run->recorder = std::make_shared<DeviceRecorder>(devices_.find(wish.device)->shared_from_this(), wish.service,
+                                                   clients_, *run->writer, options, listen_to(*run));
+  const auto name = run->info.name;
+  log(LogLevel::info, "recording begins", {{"recording", name}});
+  forget_oldest();
+  auto& kept = *(runs_[name] = std::move(run));
+  kept.recorder->start();
+  return name;
+}
+
+rr::Result<> Recordings::check_wish(const RecordingWish& wish) const {
+  if (config_.recordings.folder.empty())
     return rr::make_error(rr::ErrorCode::invalid_state, "the gateway has no \"recordings\" in its configuration");
-  auto* device = devices_.find(wish.device);
-  if (!device) return rr::make_error(rr::ErrorCode::resource_not_found, "no device " + rr::quote(wish.device));
+  if (!devices_.find(wish.device))
+    return rr::make_error(rr::ErrorCode::resource_not_found, "no device " + rr::quote(wish.device));
   if (is_replay(wish.device))
     return rr::make_error(rr::ErrorCode::invalid_state, rr::quote(wish.device) + " plays a recording already");
   const auto is_name_char = [](char c) {
@@ -256,60 +278,53 @@ rr::Result<std::string> Recordings::begin_run(const RecordingWish& wish, Paths* 
   };
   if (wish.service.empty() || !std::all_of(wish.service.begin(), wish.service.end(), is_name_char))
     return rr::make_error(rr::ErrorCode::invalid_argument, rr::quote(wish.service) + " is no name of a service");
-  auto run = std::make_unique<Run>();
-  run->wish = wish;
-  run->folder = limits.folder;
-  run->info.device = wish.device;
-  run->info.service = wish.service;
-  run->info.is_standing = ring != nullptr;
+  return {};
+}
+
+rr::Result<> Recordings::open_file(Run& run, Paths* ring) {
   std::error_code error;
-  fs::create_directories(run->folder, error);  // creating the file says what is wrong
+  fs::create_directories(run.folder, error);  // creating the file says what is wrong
   fs::path path;
   auto time = SystemClock::now();
   do {  // files that are there stay
-    run->info.name = format_recording_name({wish.device, wish.service, time});
-    run->info.begin = time;
-    path = fs::path(run->folder) / first_file_of(run->info.name);
+    run.info.name = format_recording_name({run.info.device, run.info.service, time});
+    run.info.begin = time;
+    path = fs::path(run.folder) / first_file_of(run.info.name);
     time += std::chrono::milliseconds(1);
-  } while (runs_.contains(run->info.name) || fs::exists(path, error));
+  } while (runs_.contains(run.info.name) || fs::exists(path, error));
   RecordingOptions how;
-  how.max_bytes = wish.max_file_bytes;
-  how.kept_files = static_cast<std::uint32_t>(wish.kept_files);
+  how.max_bytes = run.wish.max_file_bytes;
+  how.kept_files = static_cast<std::uint32_t>(run.wish.kept_files);
   how.library = "rrgate " + std::string(version);
   if (ring) {
-    how.ring = ring_of(wish);
+    how.ring = ring_of(run.wish);
     how.former = std::move(*ring);
   }
   auto writer = RecordingWriter::create(path.string(), std::move(how));
   if (!writer) return writer.error();
-  run->writer = std::make_unique<RecordingWriter>(std::move(*writer));
+  run.writer = std::make_unique<RecordingWriter>(std::move(*writer));
+  return {};
+}
 
-  const auto name = run->info.name;
+RecordListener Recordings::listen_to(Run& run) {
   // Not within a call of the recorder's own: that would end it.
-  const auto fail_later = [this, life = std::weak_ptr(life_), name](const rr::Error& failure) {
+  const auto fail_later = [this, life = std::weak_ptr(life_), name = run.info.name](const rr::Error& failure) {
     asio::post(executor_, [this, life, name, failure] {
       if (!life.expired()) fail(name, failure);
     });
   };
   RecordListener listener;
-  listener.begun = [raw = run.get(), fail_later](const rr::Result<>& outcome) {
+  listener.begun = [&run, fail_later](const rr::Result<>& outcome) {
     if (!outcome) return fail_later(outcome.error());
-    if (raw->wish.duration.count() > 0) raw->over = steady_clock::now() + raw->wish.duration;
+    if (run.wish.duration.count() > 0) run.over = steady_clock::now() + run.wish.duration;
   };
-  listener.problem = [raw = run.get()](const std::string& problem) {
-    raw->info.problem = problem;
-    log(LogLevel::warning, "recording has a problem", {{"recording", raw->info.name}, {"problem", problem}});
+  listener.problem = [&run](const std::string& problem) {
+    run.info.problem = problem;
+    log(LogLevel::warning, "recording has a problem", {{"recording", run.info.name}, {"problem", problem}});
   };
-  listener.solved = [raw = run.get()](const std::string& left) { raw->info.problem = left; };
+  listener.solved = [&run](const std::string& left) { run.info.problem = left; };
   listener.failed = fail_later;
-  const RecorderOptions options{wish.members, wish.interval};
-  run->recorder = std::make_shared<DeviceRecorder>(device->shared_from_this(), wish.service, clients_, *run->writer,
-                                                   options, std::move(listener));
-  log(LogLevel::info, "recording begins", {{"recording", name}});
-  forget_ended(nullptr);
-  auto& kept = *(runs_[name] = std::move(run));
-  kept.recorder->start();
-  return name;
+  return listener;
 }
 
 void Recordings::fail(const std::string& name, const rr::Error& error) {

@@ -116,8 +116,16 @@ class Recordings {
   void begin_standing(const std::vector<RecordingWish>& missing, std::vector<Paths> rings, Folder& folder);
   /// `ring`  files that count among those that are kept; null: a client wants it.
   rr::Result<std::string> begin_run(const RecordingWish& wish, Paths* ring);
+  /// Whether it can be recorded. Errors   as begin().
+  rr::Result<> check_wish(const RecordingWish& wish) const;
+  /// Names the recording by the time, and begins its file.
+  rr::Result<> open_file(Run& run, Paths* ring);
+  /// What a recorder tells of its recording, which outlives it.
+  RecordListener listen_to(Run& run);
+  /// Of the attempts that have recorded nothing, each minute another one, the newest is told of.
+  void forget_failed(const RecordingWish& wish);
   /// Those that have ended are told of by their files alone, where they are many.
-  void forget_ended(const RecordingWish* failed);
+  void forget_oldest();
   void end_run(Run& run, std::optional<rr::Error> failure);
   void fail(const std::string& name, const rr::Error& error);
 
