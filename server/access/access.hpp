@@ -8,30 +8,13 @@
 #include <string_view>
 
 #include "core/session/service/authenticator.hpp"
-#include "node/service/password_file.hpp"
-#include "node/tls/revocations.hpp"
-#include "server/access/access_config.hpp"
-#include "server/access/access_rules.hpp"
-#include "server/access/api_tokens.hpp"
+#include "server/access/access_state.hpp"
 #include "server/access/audit_entry.hpp"
 #include "server/access/refusal_digest.hpp"
 #include "server/access/sign_ins.hpp"
 #include "server/access/tickets.hpp"
 
 namespace rrgate {
-
-/// What the configuration and its files say at one time. Never changes once made.
-struct AccessState {
-  AccessConfig config = {};
-  std::map<std::string, std::string> looks = {};  ///< of each file what tells that it was changed, before it was read
-  AccessRules rules = {};
-  std::shared_ptr<const rr::PasswordFileAuthenticator> users = {};  ///< null: no users file
-  std::optional<ApiTokens> tokens = {};
-  std::optional<JwtVerifier> jwt = {};
-  rr::Revocations revoked = {};  ///< client certificates
-  rr::Bytes ticket_key = {};     ///< empty: the gateway's own
-};
-using AccessStatePtr = std::shared_ptr<const AccessState>;
 
 /// The user's name among those of the gateway's users, or of the device's, whoever has judged the login.
 Subject subject_of(const rr::AuthenticatedUser& user);
@@ -40,9 +23,6 @@ Subject subject_of(const rr::AuthenticatedUser& user);
 /// Errors   authentication_error; see rr::Authenticator.
 rr::Result<rr::AuthenticatedUser> judge_login(const rr::PasswordFileAuthenticator& users,
                                               const rr::LoginAttempt& attempt);
-
-/// Reads the files. Errors   invalid_configuration, io_error: which can't be used, and why.
-[[nodiscard]] rr::Result<AccessStatePtr> load_access(const AccessConfig& config);
 
 /// Used from the gateway's thread, the authenticator from any. Rights that change hold for the next request; sessions
 /// that are open go on.
