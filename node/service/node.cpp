@@ -21,9 +21,8 @@
 #include "node/driver/post_cancel.hpp"
 #include "node/platform/node_id_store.hpp"
 #include "node/service/login_judge.hpp"
+#include "node/service/node_listeners.hpp"
 #include "node/service/service_client.hpp"
-#include "node/transport/intra.hpp"
-#include "node/transport/local.hpp"
 #include "node/transport/tcp.hpp"
 
 namespace rr {
@@ -34,34 +33,12 @@ using boost::system::error_code;
 namespace {
 
 constexpr std::chrono::milliseconds stop_deadline{500};
-constexpr std::chrono::milliseconds send_stall{15000};
 
 NodeIdentity make_identity(std::string name, const NodeId& id) {
   if (!name.empty() && !is_valid_node_name(name))
     throw std::invalid_argument("node name " + rr::quote(name) +
                                 " is not valid: expected letters, digits, '_', '-', '.'");
   return {id.is_any() ? random_node_id() : id, std::move(name)};
-}
-
-struct ListenUrl {
-  HostPort address;
-  bool requires_tls = false;
-};
-
-ListenUrl parse_listen_url(std::string_view url) {
-  constexpr std::string_view scheme = "rr+tcp://";
-  constexpr std::string_view secure_scheme = "rrs+tcp://";
-  const auto fail = [&](const std::string& why) {
-    throw std::invalid_argument("listen on " + rr::quote(url) + ": " + why +
-                                ", expected rr+tcp://HOST:PORT, rr+local:/// or rr+intra:///");
-  };
-  const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
-  if (!is_secure && url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
-  std::string_view rest = url.substr(is_secure ? secure_scheme.size() : scheme.size());
-  if (!rest.empty() && rest.back() == '/') rest.remove_suffix(1);
-  const auto parsed = parse_host_port(rest);
-  if (!parsed) fail(parsed.error().message);
-  return {*parsed, is_secure};
 }
 
 /// The NodeID that this machine keeps for the name, while nobody else uses it.
@@ -94,7 +71,7 @@ void repeat(const std::shared_ptr<Repeat>& job) {
 
 }  // namespace
 
-class Node::Implementation final : public ServiceClientOwner, public ServiceHost {
+class Node::Implementation final : public ServiceClientOwner, public ServiceHost, public NodeListeners::Owner {
  public:
   Implementation(asio::io_context* io, std::string name, NodeOptions options)
       : options_(std::move(options)),
@@ -102,6 +79,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         io_(io ? *io : *own_io_),
         claim_(claim_stored_id(name, options_)),
         directory_(make_identity(std::move(name), claim_ ? claim_->id() : options_.id)),
+        listeners_(io_.get_executor(), options_, *this),
         thread_(std::make_shared<NodeThread>(io_.get_executor())),
         blocking_pool_(std::max<std::size_t>(1, options_.max_blocking)),
         stop_timer_(io_) {}
@@ -124,50 +102,14 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
     services_.push_back(service);
     nonce_ = make_service_state_nonce();
-    if (intra_) intra_->publish(nonce_);
-    if (local_)
-      if (auto published = local_->publish(nonce_); !published) report(published.error().message);
+    listeners_.publish(nonce_);
     if (services_changed_) services_changed_();
   }
 
   std::uint16_t listen(std::string_view url) {
-    if (url == "rr+local:///") return listen_locally();
-    if (url == "rr+intra:///") return listen_in_process();
-    const auto parsed = parse_listen_url(url);
-    const bool requires_tls = parsed.requires_tls || options_.require_tls;
-    if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
-      throw std::invalid_argument("listen on " + rr::quote(url) + ": TLS needs a certificate: NodeOptions::tls");
-    auto listener = std::make_unique<TcpListener>(io_.get_executor());
-    const auto bound = listener->open(parsed.address, true);
-    if (!bound) throw std::runtime_error(bound.error().message);
-    listener->start([this, requires_tls](asio::ip::tcp::socket socket) { accept(std::move(socket), requires_tls); },
-                    [this](const std::string& problem) { report(problem); });
-    listeners_.push_back(std::move(listener));
-    for (const auto& at : *bound) listens_.push_back({at, requires_tls});
-    if (services_changed_) services_changed_();
-    return bound->front().port;
-  }
-
-  std::uint16_t listen_locally() {
-    if (local_) throw std::invalid_argument("listen on rr+local:///: the node does so already");
-    auto listener = std::make_unique<LocalListener>(io_.get_executor());
-    if (auto opened = listener->open(identity(), nonce_, options_.local_is_public); !opened)
-      throw std::runtime_error("listen on rr+local:///: " + opened.error().message);
-    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+local"); };
-    listener->start(
-        std::move(welcome), [this](const std::string& problem) { report(problem); }, send_stall);
-    local_ = std::move(listener);
-    return 0;
-  }
-
-  std::uint16_t listen_in_process() {
-    if (intra_) throw std::invalid_argument("listen on rr+intra:///: the node does so already");
-    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+intra"); };
-    auto listener = std::make_unique<IntraListener>(io_.get_executor(), std::move(welcome), send_stall);
-    if (auto opened = listener->open(identity(), nonce_); !opened)
-      throw std::runtime_error("listen on rr+intra:///: " + opened.error().message);
-    intra_ = std::move(listener);
-    return 0;
+    const auto port = listeners_.listen(url, identity(), nonce_);
+    if (port != 0 && services_changed_) services_changed_();
+    return port;
   }
 
   void run() {
@@ -213,7 +155,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     const auto local = socket.local_endpoint(error);
     if (error || is_stopping_ || is_full()) return;  // an error: gone already
     const auto host = local.address().to_string();
-    auto stream = make_tcp_stream(std::move(socket), send_stall);
+    auto stream = make_tcp_stream(std::move(socket), NodeListeners::send_stall);
     stream->put_back(seen);
     welcome(std::move(stream), {{}, format_host_port(without_zone(host), local.port()), requires_tls});
   }
@@ -235,18 +177,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     });
   }
 
-  std::vector<std::string> listen_urls() const {
-    std::vector<std::string> out;
-    for (const auto& [address, requires_tls] : listens_) {
-      const auto at = "://" + format_host_port(address.host, address.port) +
-                      "?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes);
-      if (!requires_tls) out.push_back("rr+tcp" + at);
-      if (options_.tls && options_.tls->has_certificate()) out.push_back("rrs+tcp" + at);
-    }
-    if (local_) out.push_back("rr+local:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
-    if (intra_) out.push_back("rr+intra:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
-    return out;
-  }
+  std::vector<std::string> listen_urls() const { return listeners_.urls(identity().id); }
   const std::string& nonce() const { return nonce_; }
   void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
 
@@ -256,6 +187,18 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::size_t client_count() const {
     return static_cast<std::size_t>(
         std::count_if(clients_.begin(), clients_.end(), [](const auto& client) { return client.second->service(); }));
+  }
+
+  // NodeListeners::Owner: who comes in
+
+  void accept_tcp(asio::ip::tcp::socket socket, bool requires_tls) override { accept(std::move(socket), requires_tls); }
+  /// Nothing has to be found out first.
+  void accept_near(std::unique_ptr<ByteStream> stream, std::string scheme) override {
+    if (is_stopping_ || is_full()) return;
+    Accepted accepted;
+    accepted.stream = std::move(stream);
+    accepted.scheme = std::move(scheme);
+    add_client(std::move(accepted), "");
   }
 
   // ServiceHost: from services to clients
@@ -382,15 +325,6 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
                    asio::bind_cancellation_slot(arrival->slot(), keep));
   }
 
-  /// From this machine: nothing has to be found out first.
-  void accept_near(std::unique_ptr<ByteStream> stream, std::string scheme) {
-    if (is_stopping_ || is_full()) return;
-    Accepted accepted;
-    accepted.stream = std::move(stream);
-    accepted.scheme = std::move(scheme);
-    add_client(std::move(accepted), "");
-  }
-
   bool is_full() const { return clients_.size() + arriving_.size() >= options_.max_clients; }
 
   /// `alive`  the node may go while a client says nothing.
@@ -434,11 +368,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
   void close_listeners() {
-    for (const auto& listener : listeners_) listener->close();
-    listeners_.clear();
-    local_.reset();
-    intra_.reset();
-    listens_.clear();
+    listeners_.close();
     for (const auto& arrival : std::exchange(arriving_, {})) post_cancel(io_.get_executor(), arrival);
     for (const auto& job : repeats_) {
       job->is_stopped = true;
@@ -455,10 +385,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::vector<std::shared_ptr<Service>> services_;
   std::string nonce_ = make_service_state_nonce();
   std::function<void()> services_changed_;
-  std::vector<std::unique_ptr<TcpListener>> listeners_;
-  std::unique_ptr<LocalListener> local_;
-  std::unique_ptr<IntraListener> intra_;
-  std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
+  NodeListeners listeners_;
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
   std::map<PathMember, std::vector<ClientId>, PathMemberLess> followers_;  ///< of the wires that anybody has connected
