@@ -28,6 +28,18 @@ struct TestCamera : FrameSource {
   std::vector<Taken> waiting;
 };
 
+struct TestWebcam {
+  TestCamera* camera = nullptr;
+  std::unique_ptr<WebcamsDevice> webcams;
+  rr::RunningNode node{[this](rr::Node& made) {
+    auto owned = std::make_unique<TestCamera>();
+    camera = owned.get();
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::move(owned));
+    webcams = std::make_unique<WebcamsDevice>(made, std::move(sources));
+  }};
+};
+
 }  // namespace
 
 TEST_CASE("two cameras look out from the pose that they are given") {
@@ -122,14 +134,9 @@ TEST_CASE("frames flow to every endpoint of a camera's pipe while it streams") {
 }
 
 TEST_CASE("a camera that fails is an error to its clients, and its stream goes on when it is started again") {
-  std::unique_ptr<WebcamsDevice> webcams;
-  auto owned = std::make_unique<TestCamera>();
-  TestCamera& camera = *owned;
-  rr::RunningNode node([&](rr::Node& made) {
-    std::vector<std::unique_ptr<FrameSource>> sources;
-    sources.push_back(std::move(owned));
-    webcams = std::make_unique<WebcamsDevice>(made, std::move(sources));
-  });
+  TestWebcam device;
+  auto& node = device.node;
+  auto& camera = *device.camera;
   const auto host = rr::connect(node.url("Webcam"));
   CHECK(host.get("WebcamNames") == rr::Value(rr::MapInt32{{{0, "Test"}}}));
   const auto webcam = host.object("Webcams", "0");
@@ -159,14 +166,9 @@ TEST_CASE("a camera that fails is an error to its clients, and its stream goes o
 }
 
 TEST_CASE("a stream asks a slow camera for one frame at a time, and for none after it was stopped") {
-  std::unique_ptr<WebcamsDevice> webcams;
-  auto owned = std::make_unique<TestCamera>();
-  TestCamera& camera = *owned;
-  rr::RunningNode node([&](rr::Node& made) {
-    std::vector<std::unique_ptr<FrameSource>> sources;
-    sources.push_back(std::move(owned));
-    webcams = std::make_unique<WebcamsDevice>(made, std::move(sources));
-  });
+  TestWebcam device;
+  auto& node = device.node;
+  auto& camera = *device.camera;
   const auto host = rr::connect(node.url("Webcam"));
   const auto webcam = host.object("Webcams", "0");
   int frames = 0;

@@ -9,30 +9,15 @@
 #include <catch2/catch.hpp>
 
 #include "node/discovery/ip_discovery.hpp"
+#include "test/node/discovery/things.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/node/transport/certificate_lab.hpp"
 
 using namespace rr;
+using rr::test::make_thing;
 using std::chrono::milliseconds;
 
 namespace {
-
-constexpr const char* definition = R"(service experimental.found
-object Base
-  property int32 one
-end
-object Thing
-  implements Base
-  property int32 one
-end
-)";
-
-std::shared_ptr<Service> make_thing(const std::string& name, const std::string& attribute = {}) {
-  auto service = Service::from_text({definition}, name, "Thing");
-  service->property("one").get([] { return 1; }).set([](std::int32_t) {});
-  if (!attribute.empty()) service->set_attribute("room", Value(attribute));
-  return service;
-}
 
 /// A Discovery that hears only what the test says.
 struct Listener {

@@ -5,35 +5,17 @@
 #include <catch2/catch.hpp>
 
 #include "core/support/random.hpp"
+#include "test/node/discovery/things.hpp"
 #include "test/node/node/node_fixture.hpp"
 
 using namespace rr;
+using rr::test::make_thing;
 using namespace std::chrono_literals;
 
 namespace {
 
-constexpr const char* definition = R"(service experimental.found
-object Base
-  property int32 one
-end
-object Thing
-  implements Base
-  property int32 one
-end
-object Other
-  property int32 two
-end
-)";
-
-std::shared_ptr<Service> make_thing(const std::string& name, const std::string& room = {}) {
-  auto service = Service::from_text({definition}, name, "Thing");
-  service->property("one").get([] { return 1; }).set([](std::int32_t) {});
-  if (!room.empty()) service->set_attribute("room", Value(room));
-  return service;
-}
-
 std::shared_ptr<Service> make_other(const std::string& name) {
-  auto service = Service::from_text({definition}, name, "Other");
+  auto service = Service::from_text({rr::test::things_definition}, name, "Other");
   service->property("two").get([] { return 2; }).set([](std::int32_t) {});
   return service;
 }
