@@ -29,6 +29,11 @@ def run(*arguments, **more):
     return ran.out.strip()
 
 
+def complete(*words, **more):
+    """What a shell is told may come."""
+    return run("completion", "words", "--", *words, **more).split()
+
+
 def shown_on_terminal(*arguments, standard_output=False):
     """What somebody at a terminal sees on standard error, or on standard output."""
     terminal, theirs = pty.openpty()
