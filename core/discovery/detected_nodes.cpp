@@ -35,9 +35,11 @@ void DetectedNodes::handle_announcement(const Announcement& announcement, Now no
     node.urls.push_back(heard);
   }
   event.name_changed = node.node_name != announcement.node_name;
-  event.nonce_changed = node.service_state_nonce != announcement.service_state_nonce;
   node.node_name = announcement.node_name;
-  node.service_state_nonce = announcement.service_state_nonce;
+  // Not every way to a node tells a nonce: USB does not. That says nothing of its services.
+  const auto& nonce = announcement.service_state_nonce;
+  event.nonce_changed = !nonce.empty() && node.service_state_nonce != nonce;
+  if (event.nonce_changed) node.service_state_nonce = nonce;
   if (!event.urls_changed && !event.name_changed && !event.nonce_changed) return;
   event.node = node;
   events_.push_back(std::move(event));

@@ -75,6 +75,20 @@ TEST_CASE("a node is found once, changes when something changes, and is lost a m
   CHECK_FALSE(cache.nodes.poll_timeout().has_value());
 }
 
+TEST_CASE("an announcement without a nonce leaves the one that is known") {
+  Cache cache;
+  cache.hear(1, "a");
+  cache.hear(1, "usb", "");
+  CHECK(cache.events() == "found 1, changed 1 urls");
+  CHECK(cache.nodes.nodes().at(Cache::id(1)).service_state_nonce == "n");
+  cache.hear(1, "a");
+  CHECK(cache.events().empty());
+
+  cache.hear(2, "usb", "");
+  cache.hear(2, "b");
+  CHECK(cache.events() == "found 2, changed 2 urls nonce");
+}
+
 TEST_CASE("each URL expires by itself, and the node with its last one") {
   Cache cache;
   cache.hear(1, "a");
