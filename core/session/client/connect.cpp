@@ -56,6 +56,8 @@ void ClientSession::request_special(EntryType type, std::string_view path, Now n
 
 void ClientSession::add_login() {
   outgoing_.add_text("username", options_.username);
+  // A name alone is no login: services that do not insist on one connect whoever gives it.
+  if (options_.credentials.is_null()) return;
   // Credentials hold what the application gave: a value that cannot be packed is refused by the service's login.
   if (!pack_varvalue(outgoing_, "credentials", options_.credentials, types_))
     outgoing_.add("credentials", DataType::void_t, 0, {});

@@ -93,12 +93,19 @@ TEST_CASE("a wrong password, an unknown user and no login at all end the same wa
         std::pair{"alice", Value{}}}) {
     Guarded pair(true);
     pair.start(login(username, credentials));
-    if (*username) pair.judge();
+    if (!credentials.is_null()) pair.judge();
     const auto closed = pair.next_client<SessionClosed>();
     CHECK(closed.reason.code == ErrorCode::authentication_error);
     CHECK(closed.reason.message == "connect to 'arm': Authentication Failed");
     CHECK(pair.service->service() == nullptr);
   }
+}
+
+TEST_CASE("a name without credentials is no login: where none is needed, it connects") {
+  Guarded pair(false);
+  pair.start(login("alice", {}));
+  pair.next_client<Connected>();
+  CHECK(pair.service->user() == nullptr);
 }
 
 TEST_CASE("a login that nobody can judge fails as a connection does, and is no guess") {
