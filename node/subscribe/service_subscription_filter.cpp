@@ -1,6 +1,7 @@
 #include "node/subscribe/service_subscription_filter.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/support/glob.hpp"
 
@@ -14,33 +15,40 @@ using Group = ServiceSubscriptionFilterAttributeGroup;
 /// std::regex recurses: what others wrote must not decide how deep.
 constexpr std::size_t max_matched_size = 1024;
 
-/// Of an attribute: key, empty where there is none, and text.
+/// Key, empty where there is none, and text.
 using Texts = std::vector<std::pair<std::string, std::string>>;
+
+/// What an attribute is matched by: one text, which groups split, or those of a list or a map, which stay whole.
+struct AttributeTexts {
+  Texts texts;
+  bool is_one = false;
+};
 
 void add_text(Texts& to, const std::string& key, const Value& value) {
   if (const auto text = value.to_text()) to.emplace_back(key, *text);
 }
 
-Texts texts_of(const MapString& attributes, std::string_view name) {
-  Texts out;
+AttributeTexts texts_of(const MapString& attributes, std::string_view name) {
+  AttributeTexts out;
   for (const auto& [key, value] : attributes.items) {
     if (key != name) continue;
     if (const auto* list = value.get_if<List>())
-      for (const auto& item : list->items) add_text(out, {}, item);
+      for (const auto& item : list->items) add_text(out.texts, {}, item);
     else if (const auto* numbered = value.get_if<MapInt32>())
-      for (const auto& [number, item] : numbered->items) add_text(out, {}, item);
+      for (const auto& [number, item] : numbered->items) add_text(out.texts, {}, item);
     else if (const auto* named = value.get_if<MapString>())
-      for (const auto& [item_key, item] : named->items) add_text(out, item_key, item);
+      for (const auto& [item_key, item] : named->items) add_text(out.texts, item_key, item);
     else
-      add_text(out, {}, value);
+      add_text(out.texts, {}, value);
+    out.is_one = static_cast<bool>(value.to_text());
   }
   return out;
 }
 
-Texts split(const Texts& texts, char at) {
-  if (at == 0) return texts;
+Texts split(const AttributeTexts& attribute, char at) {
+  if (at == 0 || !attribute.is_one) return attribute.texts;
   Texts out;
-  for (const auto& [key, text] : texts) {
+  for (const auto& [key, text] : attribute.texts) {
     std::size_t begin = 0;
     for (auto end = text.find(at); end != std::string::npos; begin = end + 1, end = text.find(at, begin))
       out.emplace_back(key, text.substr(begin, end - begin));
@@ -55,24 +63,22 @@ bool matches(const ServiceSubscriptionFilterAttribute& wanted, const std::string
   return text.size() <= max_matched_size && std::regex_match(text, std::get<std::regex>(wanted.text));
 }
 
-/// Over any number of conditions; true where there is none.
+/// Over any number of conditions. "any" and "all" of none hold, so that "not any" and "not all" of none don't.
 class Combined {
  public:
   explicit Combined(Operation operation) : operation_(operation) {}
   void add(bool holds) {
-    is_empty_ = false;
-    any_ = any_ || holds;
+    any_ = any_.value_or(false) || holds;
     all_ = all_ && holds;
   }
   bool result() const {
-    if (is_empty_) return true;
     switch (operation_) {
       case Operation::or_of:
-        return any_;
+        return any_.value_or(true);
       case Operation::and_of:
         return all_;
       case Operation::nor_of:
-        return !any_;
+        return !any_.value_or(true);
       case Operation::nand_of:
         return !all_;
     }
@@ -81,18 +87,17 @@ class Combined {
 
  private:
   Operation operation_;
-  bool is_empty_ = true;
-  bool any_ = false;
+  std::optional<bool> any_;
   bool all_ = true;
 };
 
-bool holds(const Group& group, const Texts& all_texts) {
-  const auto texts = split(all_texts, group.split_at);
+bool holds(const Group& group, const AttributeTexts& attribute) {
+  const auto texts = split(attribute, group.split_at);
   Combined combined(group.operation);
   for (const auto& wanted : group.attributes)
     combined.add(std::any_of(texts.begin(), texts.end(),
                              [&](const auto& each) { return matches(wanted, each.first, each.second); }));
-  for (const auto& inner : group.groups) combined.add(holds(inner, all_texts));
+  for (const auto& inner : group.groups) combined.add(holds(inner, attribute));
   return combined.result();
 }
 
@@ -113,7 +118,7 @@ bool ServiceSubscriptionFilter::takes(const ServiceInfo& service) const {
     return false;
   Combined combined(attributes_operation);
   for (const auto& [name, group] : attributes) combined.add(holds(group, texts_of(service.attributes, name)));
-  return combined.result() && (!predicate || predicate(service));
+  return (attributes.empty() || combined.result()) && (!predicate || predicate(service));
 }
 
 }  // namespace rr

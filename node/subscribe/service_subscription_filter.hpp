@@ -35,7 +35,8 @@ struct ServiceSubscriptionFilterAttribute {
 };
 
 /// What the texts of one attribute must be together. An attribute is a text, which is split, or a list or a map of
-/// texts; one that is not there has none. A group without conditions takes all.
+/// texts, which are not; one that is not there has none. A group without conditions takes all, but none by nor_of and
+/// nand_of.
 struct ServiceSubscriptionFilterAttributeGroup {
   ServiceSubscriptionFilterOperation operation = ServiceSubscriptionFilterOperation::or_of;
   std::vector<ServiceSubscriptionFilterAttribute> attributes = {};

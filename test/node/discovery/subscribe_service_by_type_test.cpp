@@ -268,3 +268,33 @@ TEST_CASE("attribute groups combine texts, lists and maps") {
   CHECK(takes(list));
   CHECK_FALSE(takes("arm"));
 }
+
+TEST_CASE("a text is split, those of lists and maps are not") {
+  ServiceSubscriptionFilter filter;
+  auto& group = filter.attributes["kind"];
+  const auto takes = [&](Value value) { return filter.takes(info_with("kind", std::move(value))); };
+  List list;
+  list.items.emplace_back("leg,arm");
+  MapString map;
+  map.items.emplace_back("type", Value("leg,arm"));
+  group.attributes.emplace_back("arm");
+  CHECK(takes("leg,arm"));
+  CHECK_FALSE(takes(list));
+  CHECK_FALSE(takes(map));
+  group.attributes.front() = "leg,arm";
+  CHECK_FALSE(takes("leg,arm"));
+  CHECK(takes(list));
+  CHECK(takes(map));
+}
+
+TEST_CASE("of no conditions, any and all hold, and their opposites do not") {
+  using Operation = ServiceSubscriptionFilterOperation;
+  const auto [operation, is_taken] = GENERATE(table<Operation, bool>(
+      {{Operation::or_of, true}, {Operation::and_of, true}, {Operation::nor_of, false}, {Operation::nand_of, false}}));
+  ServiceSubscriptionFilter filter;
+  filter.attributes_operation = operation;
+  CHECK(filter.takes(info_with("kind", "arm")));  // no attribute is asked about
+  filter.attributes_operation = Operation::and_of;
+  filter.attributes["kind"].operation = operation;
+  CHECK(filter.takes(info_with("kind", "arm")) == is_taken);
+}
