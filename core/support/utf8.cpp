@@ -27,8 +27,10 @@ bool is_utf8(std::string_view text) {
 
 std::string_view utf8_prefix(std::string_view text, std::size_t limit) {
   if (text.size() <= limit) return text;
-  while (limit > 0 && (static_cast<unsigned char>(text[limit]) & 0xc0) == 0x80) --limit;
-  return text.substr(0, limit);
+  const auto is_within = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80; };
+  std::size_t end = limit;
+  while (end > 0 && limit - end < 3 && is_within(end)) --end;
+  return text.substr(0, is_within(end) ? limit : end);
 }
 
 void append_utf8(std::string& out, std::uint32_t code) {

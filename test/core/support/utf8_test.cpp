@@ -41,7 +41,9 @@ TEST_CASE("text is cut between characters") {
   const std::string text = "a\xc3\xa9\xe2\x82\xac";  // of 1, 2 and 3 bytes
   const std::size_t kept[] = {0, 1, 1, 3, 3, 3, 6, 6};
   for (std::size_t limit = 0; limit < 8; ++limit) CHECK(utf8_prefix(text, limit) == text.substr(0, kept[limit]));
-  CHECK(utf8_prefix("\x80\x80\x80", 2).empty());
+  const std::string bytes = "admin" + std::string(8, '\x80');
+  CHECK(utf8_prefix(bytes, 12) == bytes.substr(0, 12));
+  CHECK(utf8_prefix("\x80\x80\x80", 2) == "\x80\x80");
 }
 
 TEST_CASE("utf8: code points of one to four bytes", "[support]") {
