@@ -39,7 +39,7 @@ void add_to(Traffic& traffic, const rr::ServiceSession& session) {
 /// Definitions that the root's does not import.
 std::vector<std::string> extra_imports(const rr::TypeRegistry& types, const rr::HostedService& without) {
   std::vector<std::string> out;
-  const auto known = without.definitions_for_client();
+  const auto known = without.definitions_for_client(without.root_type());
   for (const auto& definition : types.definitions()) {
     const auto is_it = [&](const auto* other) { return other->name == definition->name; };
     if (std::none_of(known.begin(), known.end(), is_it)) out.push_back(definition->name);

@@ -52,14 +52,26 @@ Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std
   return service;
 }
 
-const ServiceDefinition& HostedService::root_definition() const {
-  return *types_->find_service(split_qualified(root_->type_name()).service);
+const EntityDefinition* HostedService::type_for_client(const EntityDefinition& type, const Version& client) const {
+  const auto is_known = [&](const EntityDefinition& candidate) {
+    const auto& needed = definition_of(candidate).version;
+    return client.is_unspecified() || needed.is_unspecified() || needed <= client;
+  };
+  if (is_known(type)) return &type;
+  for (const auto& base : type.implements)
+    if (const auto* candidate = types_->find_entity(base.qualified_name); candidate && is_known(*candidate))
+      return candidate;
+  return nullptr;
 }
 
-std::vector<const ServiceDefinition*> HostedService::definitions_for_client() const {
+const ServiceDefinition& HostedService::definition_of(const EntityDefinition& type) const {
+  return *types_->find_service(split_qualified(type.qualified_name).service);
+}
+
+std::vector<const ServiceDefinition*> HostedService::definitions_for_client(const EntityDefinition& root) const {
   std::set<std::string, std::less<>> names;
   std::vector<std::string> open = extra_imports_;
-  open.push_back(root_definition().name);
+  open.push_back(definition_of(root).name);
   while (!open.empty()) {
     const auto name = std::move(open.back());
     open.pop_back();

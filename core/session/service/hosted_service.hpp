@@ -77,10 +77,14 @@ class HostedService {
   void set_remote() { is_remote_ = true; }
   ObjectLocks& object_locks() { return object_locks_; }
   MonitorLocks& monitor_locks() { return monitor_locks_; }
-  /// The definition that holds the root type.
-  const ServiceDefinition& root_definition() const;
-  /// What a client needs: the root's definition, the extra imports and all that these import; in order of names.
-  std::vector<const ServiceDefinition*> definitions_for_client() const;
+  /// As what a client of this level sees an object of `type`: the type, else the first that it implements, whose
+  /// definition is of that level at most. nullptr: the client knows none of them.
+  const EntityDefinition* type_for_client(const EntityDefinition& type, const Version& client) const;
+  /// The one that holds `type`.
+  const ServiceDefinition& definition_of(const EntityDefinition& type) const;
+  /// What a client needs that sees the root as `root`: its definition, the extra imports and all that these import; in
+  /// order of names.
+  std::vector<const ServiceDefinition*> definitions_for_client(const EntityDefinition& root) const;
 
   struct Found {
     std::shared_ptr<ServiceObject> object;

@@ -317,14 +317,14 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
     done = answer_session_op(message, entry, now);
   } else {
     begin_reply(entry);
-    done = answer_session_request(entry);
+    done = answer_session_request(message, entry);
     if (done) send_outgoing(now);
   }
   if (!done) send_error(entry, done.error(), now);
 }
 
 /// Requests to the session itself; the reply is begun.
-Result<> ServiceSession::answer_session_request(const MessageEntry& entry) {
+Result<> ServiceSession::answer_session_request(const Message& message, const MessageEntry& entry) {
   switch (entry.type) {
     case EntryType::client_keep_alive_req:
       return {};
@@ -334,11 +334,15 @@ Result<> ServiceSession::answer_session_request(const MessageEntry& entry) {
       return {};
     case EntryType::object_type_name: {
       if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
+      const auto version = read_client_version(message, entry);
+      if (!version) return version.error();
       const auto service = service_;  // whose type is named; the application, which is asked, may end the session
       const auto found = find_object(entry.service_path);
       if (!found) return found.error();
+      const auto* type = service->type_for_client(*found->type, *version);
+      if (!type) return make_error(ErrorCode::object_not_found, "Service requires newer client version");
       begin_reply(entry);  // anew: the application, which was asked, may have had this session send something
-      outgoing_.add_text("objecttype", found->type->qualified_name);
+      outgoing_.add_text("objecttype", type->qualified_name);
       return {};
     }
     default:

@@ -291,6 +291,7 @@ class ServiceSession {
   // node-level requests (special.cpp)
   void handle_special(const Message& message, Now now);
   Result<> answer_special(const Message& message, const MessageEntry& entry, Now now);
+  static Result<Version> read_client_version(const Message& message, const MessageEntry& entry);
   Result<> write_service_desc(const Message& message, const MessageEntry& entry);
   Result<> write_root_type(const Message& message, const MessageEntry& entry);
   Result<> write_combined(const Message& message, const MessageEntry& entry, Now now);
@@ -335,7 +336,7 @@ class ServiceSession {
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);
-  Result<> answer_session_request(const MessageEntry& entry);
+  Result<> answer_session_request(const Message& message, const MessageEntry& entry);
   Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
   Result<> add_call(const Message& message, const MessageEntry& entry, CallKind kind, HostedService::Found found,
                     const MemberDefinition& member);

@@ -1,10 +1,8 @@
 // Node-level requests: definitions, types, connect and disconnect. They need no session. Layer: session.
 // Source: sessions spec sections 2.2, 2.3, 2.4.
-#include <set>
 #include <utility>
 
 #include "core/member/error_entry.hpp"
-#include "core/robdef/model/names.hpp"
 #include "core/session/known_definitions.hpp"
 #include "core/session/service/service_session.hpp"
 
@@ -56,32 +54,6 @@ bool write_tag(Message& message, const std::optional<std::string>& known_tag,
   const auto tag = make_definitions_tag(texts);
   message.add_text(definitions_element, message.store(std::string_view(tag)));
   return tag == *known_tag;
-}
-
-/// The client's level from `clientversion`; unspecified where it is absent.
-Result<Version> read_client_version(const Message& message, const MessageEntry& entry) {
-  const auto* element = message.elements_of(entry).find("clientversion");
-  if (!element) return Version{};
-  auto version = element->type == DataType::string_t
-                     ? parse_version(element->text())
-                     : Result<Version>(make_error(ErrorCode::data_type_mismatch, "not a string"));
-  if (!version) return make_error(ErrorCode::invalid_argument, "clientversion: " + version.error().message);
-  return version;
-}
-
-/// The newest type, of this one and what it implements, that a client of this level knows; empty if there is none.
-std::string type_for_client(const HostedService& service, const Version& client) {
-  const auto& types = service.types();
-  const auto& type = service.root_type();
-  const auto& home = service.root_definition();
-  if (client.is_unspecified() || home.version.is_unspecified() || home.version <= client) return type.qualified_name;
-  std::set<std::string_view> seen_definitions;
-  for (const auto& base : type.implements) {
-    const auto* definition = types.find_service(split_qualified(base.qualified_name).service);
-    if (!definition || definition == &home || !seen_definitions.insert(definition->name).second) continue;
-    if (definition->version.is_unspecified() || definition->version <= client) return base.qualified_name;
-  }
-  return {};
 }
 
 void add_text_list(Message& message, std::string_view name, const std::vector<std::string_view>& texts) {
@@ -201,8 +173,20 @@ Result<> ServiceSession::write_attributes(std::string_view element, const Hosted
   return pack_varvalue(outgoing_, element, session_attributes_, service.types());
 }
 
+/// From `clientversion`; unspecified where it is absent.
+Result<Version> ServiceSession::read_client_version(const Message& message, const MessageEntry& entry) {
+  const auto* element = message.elements_of(entry).find("clientversion");
+  if (!element) return Version{};
+  auto version = element->type == DataType::string_t
+                     ? parse_version(element->text())
+                     : Result<Version>(make_error(ErrorCode::data_type_mismatch, "not a string"));
+  if (!version) return make_error(ErrorCode::invalid_argument, "clientversion: " + version.error().message);
+  return version;
+}
+
 Result<> ServiceSession::write_service_desc(const Message& message, const MessageEntry& entry) {
-  if (auto version = read_client_version(message, entry); !version) return version.error();
+  const auto version = read_client_version(message, entry);
+  if (!version) return version.error();
   const auto* type = find_text(message, entry, "ServiceType");
   if (!type) type = find_text(message, entry, "servicetype");
   if (type) {
@@ -215,11 +199,13 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   }
   const auto service = directory_.find(entry.service_path);
   if (!service) return missing_service(entry.service_path);
+  const auto* root = service->type_for_client(service->root_type(), *version);
+  if (!root) return service_not_found();
   if (auto packed = write_attributes("attributes", *service); !packed) return packed;
   if (!service->extra_imports().empty())
     add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
   keep_types(*service);
-  outgoing_.add_text("servicedef", service->root_definition().text);
+  outgoing_.add_text("servicedef", service->definition_of(*root).text);
   return {};
 }
 
@@ -253,12 +239,10 @@ Result<> ServiceSession::write_root_type(const Message& message, const MessageEn
   auto begun = std::exchange(outgoing_, {});  // the application, which is asked, may have this session send something
   const auto found = service->find_object(entry.service_path, RememberObjects::no);
   outgoing_ = std::move(begun);
-  if (!found) return object_not_found();
-  const bool is_root = found->type == &service->root_type();
-  const auto name = is_root ? type_for_client(*service, *version) : found->type->qualified_name;
-  const auto* type = service->types().find_entity(name);
+  const auto* type = found ? service->type_for_client(*found->type, *version) : nullptr;
   if (!type) return object_not_found();
-  outgoing_.add_text("objecttype", outgoing_.store(std::string_view(name)));
+  keep_types(*service);
+  outgoing_.add_text("objecttype", type->qualified_name);
   add_implements(outgoing_, *type);
   return {};
 }
@@ -271,8 +255,7 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   // Who may not connect without a login does not hear by it either what there is.
   if (!service && logs_in && !admits(entry.type, entry.service_path, nullptr)) return login_failed();
   if (!service) return missing_service(entry.service_path);
-  const auto type_name = type_for_client(*service, *version);
-  const auto* type = service->types().find_entity(type_name);
+  const auto* type = service->type_for_client(service->root_type(), *version);
   if (!type) return service_not_found();
   OpenLogin request;
   request.service = service;
@@ -311,7 +294,8 @@ Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional
   add_implements(outgoing_, *request.type_for_client);
   if (request.wants_definitions) {
     std::vector<std::string_view> texts;
-    for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
+    for (const auto* definition : service->definitions_for_client(*request.type_for_client))
+      texts.push_back(definition->text);
     keep_types(*service);
     if (!write_tag(outgoing_, request.known_tag, texts)) add_text_list(outgoing_, "servicedefs", texts);
   }
