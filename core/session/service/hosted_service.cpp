@@ -163,6 +163,7 @@ Result<> HostedService::add_object(const std::string& path, std::shared_ptr<Serv
 std::vector<std::string> HostedService::forget_path(std::string_view path) {
   if (path == name_) return {};
   const auto wanted = canonical_path(path);
+  object_locks_.handle_release(wanted);
   const auto segments = static_cast<std::size_t>(std::count(path.begin(), path.end(), '.'));
   const auto stem = path.substr(0, path.find('['));
   std::vector<std::string> spellings;

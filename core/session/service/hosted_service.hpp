@@ -101,7 +101,8 @@ class HostedService {
   /// An object of a remote service that was found. Where there is no room, a path that no client uses is forgotten for
   /// it. Errors   service_definition_error: its type is not known; out_of_system_resource.
   Result<> add_object(const std::string& path, std::shared_ptr<ServiceObject> object);
-  /// Forgets `path`, its other spellings and everything below. Returns the spellings that clients have used.
+  /// Forgets `path`, its other spellings and everything below, and frees what is locked of these. Returns the spellings
+  /// that clients have used.
   std::vector<std::string> forget_path(std::string_view path);
   /// All paths under which `object` is known.
   std::vector<std::string> paths_of(const ServiceObject& object) const;

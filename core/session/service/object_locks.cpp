@@ -1,5 +1,7 @@
 #include "core/session/service/object_locks.hpp"
 
+#include "core/session/service_path.hpp"
+
 namespace rr {
 
 namespace {
@@ -46,6 +48,10 @@ Result<> ObjectLocks::check(const std::string& path, const AuthenticatedUser* us
   const auto& lock = found->second;
   if (user && user->name == lock.user && (lock.session == 0 || lock.session == session)) return {};
   return locked("Object locked by " + lock.user);
+}
+
+void ObjectLocks::handle_release(std::string_view path) {
+  std::erase_if(locks_, [path](const auto& lock) { return is_within(lock.first, path); });
 }
 
 void ObjectLocks::handle_login(const std::string& user) {

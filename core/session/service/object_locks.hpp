@@ -30,6 +30,8 @@ class ObjectLocks {
   bool empty() const { return locks_.empty(); }
   std::size_t size() const { return locks_.size(); }
 
+  /// The object of `path` is replaced: it and what is below it are no longer those that were locked.
+  void handle_release(std::string_view path);
   void handle_login(const std::string& user);
   /// Frees the session's client locks, and with its last session all locks of the user.
   void handle_logout(const std::string& user, SessionId session);

@@ -191,6 +191,28 @@ TEST_CASE("a user lock keeps out other users, from the object and all below it")
   CHECK(all.unlock(alice));  // not locked is no error
 }
 
+TEST_CASE("an object that is replaced is locked no more, unless what is above it is") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  CHECK(all.get(bob, "name", "arm.tool"));
+  CHECK(all.get(bob, "name", "arm.tools[a]"));
+  CHECK(all.lock(alice, LockKind::user, "arm.tool"));
+  CHECK(all.lock(alice, LockKind::client, "arm.tools[a]"));
+  CHECK(why(all.get(bob, "name", "arm.tool")) == "151 Object locked by alice");
+  all.service().forget_path("arm.tool");
+  CHECK(all.get(bob, "name", "arm.tool"));
+  CHECK(why(all.get(bob, "name", "arm.tools[a]")) == "151 Object locked by alice");
+  CHECK(all.unlock(alice, "arm.tool"));  // not locked is no error
+  CHECK(all.lock(bob, LockKind::user, "arm.tool"));
+  CHECK(all.unlock(bob, "arm.tool"));
+  CHECK(all.unlock(alice, "arm.tools[a]"));
+
+  CHECK(all.lock(alice));
+  all.service().forget_path("arm.tool");
+  CHECK(why(all.get(bob, "name", "arm.tool")) == "151 Object locked by alice");
+}
+
 TEST_CASE("a locked object's memories are locked; those with nolockread can still be read") {
   Clients all;
   auto& alice = all.add("alice");
