@@ -459,7 +459,8 @@ std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
     if (const auto object = weak.lock(); object && why_partly_.empty())
       for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
   if (!missing.empty()) refuse("service " + rr::quote(name_) + ": no handler for " + missing);
-  auto hosted = HostedService::make(name_, root_, types_, attributes_);
+  auto hosted =
+      HostedService::make(name_, root_, types_, attributes_, unimported_definitions(*types_, root_->type_name()));
   if (!hosted) refuse("service " + rr::quote(name_) + ": " + hosted.error().message);
   hosted_ = std::move(*hosted);
   unattached_.clear();

@@ -297,9 +297,10 @@ class ServiceHost {
 /// A service: definition, name, root object.
 class Service {
  public:
-  /// `root_type` is the object's name in the last definition, or its qualified name. In compat mode the definitions may
-  /// be such as clients of other makes refuse.
-  /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or
+  /// `root_type` is the object's name in the last definition, or its qualified name. Clients get all definitions, also
+  /// those that it does not import: for what a varvalue or an objref varobject holds. In compat mode the definitions
+  /// may be such as clients of other makes refuse. Throws   std::invalid_argument with the first finding where a
+  /// definition is not valid, an import is missing, or
   ///          there is no such object.
   static std::shared_ptr<Service> from_text(const std::vector<std::string>& definitions, std::string name,
                                             const std::string& root_type, RobdefMode mode = RobdefMode::strict);

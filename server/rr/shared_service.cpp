@@ -36,17 +36,6 @@ void add_to(Traffic& traffic, const rr::ServiceSession& session) {
   traffic.ledgers.add(session.total_ledgers());
 }
 
-/// Definitions that the root's does not import.
-std::vector<std::string> extra_imports(const rr::TypeRegistry& types, const rr::HostedService& without) {
-  std::vector<std::string> out;
-  const auto known = without.definitions_for_client(without.root_type());
-  for (const auto& definition : types.definitions()) {
-    const auto is_it = [&](const auto* other) { return other->name == definition->name; };
-    if (std::none_of(known.begin(), known.end(), is_it)) out.push_back(definition->name);
-  }
-  return out;
-}
-
 }  // namespace
 
 SharedService::SharedService(std::shared_ptr<Device> device, std::string name, std::vector<ServiceBoard*> boards)
@@ -115,10 +104,9 @@ rr::Result<> SharedService::publish() {
   }
   types_ = upstream_->types();
   const auto root = std::make_shared<SharedObject>(name_, root_type);
-  auto hosted = rr::HostedService::make(name_, root, types_, attributes);
+  auto hosted =
+      rr::HostedService::make(name_, root, types_, attributes, rr::unimported_definitions(*types_, root_type));
   if (!hosted) return hosted.error();
-  if (auto more = extra_imports(*types_, **hosted); !more.empty())
-    hosted = rr::HostedService::make(name_, root, types_, attributes, std::move(more));
   hosted_ = std::move(*hosted);
   hosted_->set_remote();
   renew_judge();

@@ -12,6 +12,23 @@
 
 namespace rr {
 
+namespace {
+
+/// The definitions of these names and all that they import.
+std::set<std::string, std::less<>> with_imports(const TypeRegistry& types, std::vector<std::string> open) {
+  std::set<std::string, std::less<>> names;
+  while (!open.empty()) {
+    const auto name = std::move(open.back());
+    open.pop_back();
+    const auto* definition = types.find_service(name);
+    if (!definition || !names.insert(name).second) continue;
+    for (const auto& import : definition->imports) open.push_back(import.name);
+  }
+  return names;
+}
+
+}  // namespace
+
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
   const auto& type = objref.type;
   if (!objref.is_indexed()) {
@@ -23,6 +40,14 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
     return make_error(ErrorCode::invalid_argument,
                       "objref '" + objref.name + "': index " + quote(*index) + ": expected a decimal int32");
   return {};
+}
+
+std::vector<std::string> unimported_definitions(const TypeRegistry& types, std::string_view root_type) {
+  const auto imported = with_imports(types, {std::string(split_qualified(root_type).service)});
+  std::vector<std::string> names;
+  for (const auto& definition : types.definitions())
+    if (!imported.contains(definition->name)) names.push_back(definition->name);
+  return names;
 }
 
 std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base) {
@@ -69,19 +94,10 @@ const ServiceDefinition& HostedService::definition_of(const EntityDefinition& ty
 }
 
 std::vector<const ServiceDefinition*> HostedService::definitions_for_client(const EntityDefinition& root) const {
-  std::set<std::string, std::less<>> names;
-  std::vector<std::string> open = extra_imports_;
+  auto open = extra_imports_;
   open.push_back(definition_of(root).name);
-  while (!open.empty()) {
-    const auto name = std::move(open.back());
-    open.pop_back();
-    const auto* definition = types_->find_service(name);
-    if (!definition || !names.insert(name).second) continue;
-    for (const auto& import : definition->imports) open.push_back(import.name);
-  }
   std::vector<const ServiceDefinition*> definitions;
-  definitions.reserve(names.size());
-  for (const auto& name : names) definitions.push_back(types_->find_service(name));
+  for (const auto& name : with_imports(*types_, std::move(open))) definitions.push_back(types_->find_service(name));
   return definitions;
 }
 

@@ -45,13 +45,17 @@ std::string_view implements_name(const EntityDefinition& type, const ImplementsD
 /// Errors   invalid_argument.
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index);
 
+/// The definitions of `types` that the one of `root_type` does not import.
+std::vector<std::string> unimported_definitions(const TypeRegistry& types, std::string_view root_type);
+
 /// Whether objects that are found stay for others.
 enum class RememberObjects : std::uint8_t { no, yes };
 
 /// One service of a node.
 class HostedService {
  public:
-  /// `types` holds the root type's definition and everything that it imports.
+  /// `types` holds the root type's definition and everything that it imports. `extra_imports` are others of them that
+  /// clients get when they connect: for what a varvalue holds.
   /// Errors   service_definition_error: the root type is not an object in `types`; invalid_argument: a bad name.
   static Result<std::shared_ptr<HostedService>> make(std::string name, std::shared_ptr<ServiceObject> root,
                                                      std::shared_ptr<const TypeRegistry> types,

@@ -26,10 +26,13 @@ class NewObject final : public PlainObject {
 /// A client that speaks by hand, to a service `top`.
 class LeveledClient {
  public:
-  explicit LeveledClient(std::string level) : level_(std::move(level)) {
+  explicit LeveledClient(std::string level, const std::vector<std::string>& definitions = level_definitions)
+      : level_(std::move(level)) {
     auto types = std::make_shared<TypeRegistry>();
-    types->add(level_definitions, RobdefMode::strict).value();
-    pair_.directory.add(HostedService::make("top", std::make_shared<NewObject>(), types).value()).value();
+    types->add(definitions, RobdefMode::strict).value();
+    auto extra_imports = unimported_definitions(*types, "x.top.Top");
+    auto service = HostedService::make("top", std::make_shared<NewObject>(), types, {}, std::move(extra_imports));
+    pair_.directory.add(std::move(*service)).value();
     pair_.lose_requests();
   }
 
@@ -101,4 +104,13 @@ TEST_CASE("clients are told of the newest type that they know, with its definiti
     CHECK(client.ask(EntryType::object_type_name, "top", "objecttype") ==
           Texts{"Service requires newer client version"});
   }
+}
+
+TEST_CASE("what the root's definition does not import is an extra import, which clients get as well") {
+  const std::string unit = "service x.unit\nstdver 0.10\nstruct Unit\nfield string name\nend\n";
+  const std::string value = "service x.value\nstdver 0.10\nimport x.unit\nstruct Value\nfield x.unit.Unit unit\nend\n";
+  LeveledClient client("1.2.8", {level_definitions[0], level_definitions[1], unit, value});
+  CHECK(client.ask(EntryType::get_service_desc, "top", "extraimports") == Texts{"x.unit", "x.value"});
+  CHECK(client.ask(EntryType::connect_client_combined, "top", "servicedefs") ==
+        Texts{level_definitions[0], level_definitions[1], unit, value});
 }

@@ -55,6 +55,18 @@ std::shared_ptr<Service> add_echo(Node& node) {
 
 }  // namespace
 
+TEST_CASE("a varvalue may be of a definition that the service's own does not import") {
+  RunningNode node([](Node& device) {
+    auto service = Service::from_text({"service test.unit\nstdver 0.10\nstruct Unit\n    field string name\nend\n",
+                                       "service test.any\nstdver 0.10\nobject Any\n"
+                                       "    property varvalue unit [readonly]\nend\n"},
+                                      "Any", "Any");
+    service->property("unit").get([] { return Value(Structure{"test.unit.Unit", {{"name", Value("mm")}}}); });
+    device.add(service);
+  });
+  CHECK(connect(node.url("Any")).get("unit") == Value(Structure{"test.unit.Unit", {{"name", Value("mm")}}}));
+}
+
 TEST_CASE("connecting fails with a reason") {
   RunningNode node(add_echo);
   CHECK(error_of([&] { connect(node.url("Nothing")); }).code == ErrorCode::service_not_found);
