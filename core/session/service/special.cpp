@@ -153,7 +153,7 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
       outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
       return {};
     case EntryType::get_service_attributes: {
-      const auto service = directory_.find(entry.service_path);
+      const auto service = directory_.find(service_name_of(entry));
       if (!service) return make_error(ErrorCode::service_error, "Service not found");
       // Once a message: it is a long answer to a short question.
       const bool tells_losses = service == service_ && may_use_service() && told_attributes_.is_null();

@@ -114,3 +114,10 @@ TEST_CASE("what the root's definition does not import is an extra import, which 
   CHECK(client.ask(EntryType::connect_client_combined, "top", "servicedefs") ==
         Texts{level_definitions[0], level_definitions[1], unit, value});
 }
+
+TEST_CASE("a service's attributes are told by the path of any of its objects") {
+  LeveledClient client("1.2.8");
+  CHECK(client.ask(EntryType::get_service_attributes, "top", "return").empty());
+  CHECK(client.ask(EntryType::get_service_attributes, "top.part", "return").empty());
+  CHECK(client.ask(EntryType::get_service_attributes, "other.part", "return") == Texts{"Service not found"});
+}
