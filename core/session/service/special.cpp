@@ -3,8 +3,10 @@
 #include <utility>
 
 #include "core/member/error_entry.hpp"
+#include "core/robdef/model/names.hpp"
 #include "core/session/known_definitions.hpp"
 #include "core/session/service/service_session.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -263,9 +265,8 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   request.client_endpoint = message.header.sender_endpoint;
   request.type_for_client = type;
   const auto* flag = find_text(message, entry, "returnservicedefs");
-  request.wants_definitions =
-      !flag || (flag->text() != "0" && flag->text() != "false" && flag->text() != "False" && flag->text() != "FALSE");
-
+  const auto wish = flag ? to_lower(trim(flag->text())) : std::string();
+  request.wants_definitions = wish != "0" && wish != "false";
   request.known_tag = read_known_tag(message, entry);
 
   const auto& policy = service->policy();

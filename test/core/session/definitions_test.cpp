@@ -37,12 +37,14 @@ class LeveledClient {
   }
 
   /// The texts of an element of the answer, lists of them in order, or the error's.
-  std::vector<std::string> ask(EntryType type, std::string_view path, std::string_view element) {
+  std::vector<std::string> ask(EntryType type, std::string_view path, std::string_view element,
+                               std::string_view wants_definitions = "true") {
     const auto endpoint = pair_.service->endpoint();
     pair_.forge(*pair_.client, [&](Message& message) {
       message.header.receiver_endpoint = endpoint;
       message.begin_entry(type, path, "", 7);
       message.add_text("clientversion", level_);
+      message.add_text("returnservicedefs", wants_definitions);
     });
     pair_.carry(*pair_.client, *pair_.service, 1u << 20);
     Bytes bytes;
@@ -120,4 +122,11 @@ TEST_CASE("a service's attributes are told by the path of any of its objects") {
   CHECK(client.ask(EntryType::get_service_attributes, "top", "return").empty());
   CHECK(client.ask(EntryType::get_service_attributes, "top.part", "return").empty());
   CHECK(client.ask(EntryType::get_service_attributes, "other.part", "return") == Texts{"Service not found"});
+}
+
+TEST_CASE("definitions stay away however a client says that it does not want them") {
+  const std::string_view no = GENERATE("false", "FALSE", "fAlse", " False ", "0", "\t0");
+  CHECK(LeveledClient("1.2.8").ask(EntryType::connect_client_combined, "top", "servicedefs", no).empty());
+  const std::string_view yes = GENERATE("true", "1", "no", "");
+  CHECK(LeveledClient("1.2.8").ask(EntryType::connect_client_combined, "top", "servicedefs", yes) == level_definitions);
 }
