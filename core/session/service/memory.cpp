@@ -13,7 +13,7 @@ Result<> ServiceSession::answer_memory(const Message& message, const MessageEntr
   if (entry.type == EntryType::memory_get_param) {
     const auto* parameter = message.elements_of(entry).find("parameter");
     if (!parameter || parameter->type != DataType::string_t)
-      return make_error(ErrorCode::message_element_not_found,
+      return make_error(parameter ? ErrorCode::data_type_mismatch : ErrorCode::message_element_not_found,
                         "memory '" + member.name + "': text element 'parameter' not found");
     if (parameter->text() == memory_parameter::limit) {
       begin_reply(entry);

@@ -243,6 +243,11 @@ TEST_CASE("requests of bad clients are refused before the application hears of t
   CHECK(script.answer_to_parameter("grid", "Length").code == ErrorCode::invalid_operation);
   CHECK(script.answer_to_parameter("grid", nullptr).code == ErrorCode::message_element_not_found);
   CHECK(script.answer_to_parameter("grid", "MaxTransferSize").code == ErrorCode::none);
+  const auto is_no_text = [](Message& message) {
+    message.begin_entry(EntryType::memory_get_param, "arm", "data", 1);
+    message.add_scalar("parameter", DataType::int32_t, std::int32_t{1});
+  };
+  CHECK(script.answer_to(is_no_text).code == ErrorCode::data_type_mismatch);
   CHECK_FALSE(script.service->poll_event());
 }
 
