@@ -90,11 +90,11 @@ describe("control", () => {
     expect(held.release).toHaveBeenCalledOnce();
     tell("held"); // an answer that comes late
     expect(control.mayCommand).toBe(false);
-    const next = new Control(object, control.state.value);
+    const next = new Control(object, control);
     await expect(next.begin()).rejects.toThrow("the device is away");
     await next.take();
     expect(next.mayCommand).toBe(true);
-    expect(new Control(object, next.state.value).state.value).toEqual({ kind: "idle" });
+    expect(new Control(object, next).state.value).toEqual({ kind: "idle" });
   });
   it("that is granted when nobody shows it any more, or the device has gone, is given back at once", async () => {
     for (const leave of [(control: Control) => control.use()(), (control: Control) => control.end("away")]) {
@@ -117,6 +117,18 @@ describe("control", () => {
     expect(lease).toHaveBeenCalledWith({ takeover: true, timeout: 2_000 });
     expect(held.release).toHaveBeenCalledOnce();
     await expect(stopNow(object, true, () => Promise.reject(new Error("away")))).rejects.toThrow("away");
+  });
+  it("that needed no lease over the connection before: a stop that somebody's lock keeps out has stopped nothing", async () => {
+    const { control, object } = setup(() => Promise.reject(failed("NotImplementedError", "none")));
+    await control.begin();
+    const { controls } = object as { controls: Map<string, Control> };
+    controls.set("Create.arm", new Control(object, control));
+    const refused = () => stopNow(object, false, () => Promise.reject(failed("ObjectLockedError", "locked by vera")));
+    await expect(refused()).rejects.toThrow("locked by vera");
+    controls.set("Create.arm", new Control(setup().object, control)); // of a gateway that gives leases by now
+    await expect(refused()).rejects.toThrow("locked by vera");
+    await controls.get("Create.arm")?.begin();
+    await refused(); // the gateway makes safe what was commanded since
   });
   it("that needs no lease: a stop that somebody's lock keeps out has stopped nothing, and is sent again", async () => {
     vi.useFakeTimers();

@@ -31,15 +31,23 @@ export class Control {
   #taking: Promise<void> | null = null;
   /** What is granted from now on is wanted no more. */
   #isLeft = false;
+  #isUnguarded: boolean;
 
   /** `before`: of the same object over the connection before; what was lost there is lost here. */
-  constructor(object: Pick<Remote, "lease">, before?: ControlState) {
+  constructor(object: Pick<Remote, "lease">, before?: Control) {
     this.#object = object;
-    this.state = new Store<ControlState>(before?.kind === "lost" ? before : { kind: "idle" });
+    const was = before?.state.value;
+    this.state = new Store<ControlState>(was?.kind === "lost" ? was : { kind: "idle" });
+    this.#isUnguarded = before?.isUnguarded ?? false;
   }
 
   get mayCommand(): boolean {
     return this.state.value.kind === "held" || this.state.value.kind === "free";
+  }
+
+  /** Whether its commands needed no lease, perhaps over a connection before: nobody makes safe what they did. */
+  get isUnguarded(): boolean {
+    return this.#isUnguarded;
   }
 
   /** For a first command. @throws (rejects) where others have it, and where it was lost. */
@@ -98,6 +106,7 @@ export class Control {
         throw error;
       }
       this.state.value = { kind: "free" };
+      this.#isUnguarded = true;
       return;
     }
     if (this.#isLeft) {
@@ -111,6 +120,7 @@ export class Control {
   #hold(lease: Lease): void {
     const since = Date.now();
     this.#lease = lease;
+    this.#isUnguarded = false;
     this.state.value = { kind: "held", since };
     lease.onState((state, reason) => {
       if (lease !== this.#lease) return;
@@ -146,7 +156,7 @@ const controls = new WeakMap<Remote, Control>();
 export function controlOf(object: Remote): Control {
   const found = controls.get(object);
   if (found) return found;
-  const control = new Control(object, object.controls.get(object.path)?.state.value);
+  const control = new Control(object, object.controls.get(object.path));
   controls.set(object, control);
   object.controls.set(object.path, control);
   return control;
@@ -176,7 +186,7 @@ export async function stopNow(
     }
     if (await object.locks.giveUp(object.path)) return stopNow(object, insists, stop);
     if (!insists) {
-      if (control?.state.value.kind === "free") throw error;
+      if (control?.isUnguarded) throw error;
       return;
     }
     const timeout = 2_000;
