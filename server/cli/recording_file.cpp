@@ -20,7 +20,7 @@ double seconds_between(McapTime from, McapTime to) {
 
 rr::OrderedJson describe(const Recording& recording) {
   rr::OrderedJson out;
-  out["file"] = recording.path();
+  out["file"] = recording.name();
   out["bytes"] = recording.size();
   out["messages"] = recording.message_count();
   out["begin"] = mcap_time_text(recording.begin());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 
 #include "core/support/hex.hpp"
@@ -74,10 +75,10 @@ rr::Result<T> checked(rr::ByteReader& in, T value) {
 
 }  // namespace
 
-rr::Result<McapReader> McapReader::open(const std::string& path) {
-  McapReader out(path);
+rr::Result<McapReader> McapReader::open(const std::string& file, const std::string& folder) {
+  McapReader out(file);
   errno = 0;
-  out.file_.open(path, std::ios::binary | std::ios::ate);
+  out.file_.open(std::filesystem::path(folder) / file, std::ios::binary | std::ios::ate);
   const auto end = out.file_ ? static_cast<std::int64_t>(out.file_.tellg()) : -1;
   std::string magic(mcap_magic.size(), '\0');
   out.file_.seekg(0);
@@ -85,18 +86,18 @@ rr::Result<McapReader> McapReader::open(const std::string& path) {
   if (end < 0 || (!out.file_ && !out.file_.eof())) {
     const int why = errno;
     return rr::make_error(why == ENOENT ? rr::ErrorCode::resource_not_found : rr::ErrorCode::system_resource_error,
-                          path + ": can't be read: " + std::generic_category().message(why));
+                          file + ": can't be read: " + std::generic_category().message(why));
   }
   magic.resize(static_cast<std::size_t>(out.file_.gcount()));
   if (magic != mcap_magic)
-    return malformed(path + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));
+    return malformed(file + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));
   out.size_ = static_cast<std::uint64_t>(end);
   out.at_ = mcap_magic.size();
   return out;
 }
 
 rr::Error McapReader::error_in(const McapRecord& record, std::string_view what) const {
-  return malformed(path_ + ": " + std::string(opcode_name(record.opcode)) + " at byte " +
+  return malformed(name_ + ": " + std::string(opcode_name(record.opcode)) + " at byte " +
                    std::to_string(record.offset) + ": " + std::string(what));
 }
 
@@ -114,7 +115,7 @@ rr::Result<McapRecord> McapReader::read_at(std::uint64_t offset) {
   at_ = offset;
   auto record = read_record();
   if (!record) return record.error();
-  if (!*record) return malformed(path_ + ": no record at byte " + std::to_string(offset) + " any more");
+  if (!*record) return malformed(name_ + ": no record at byte " + std::to_string(offset) + " any more");
   return **record;
 }
 

@@ -23,7 +23,8 @@ struct McapRecord {
 /// system_resource_error.
 class McapReader {
  public:
-  static rr::Result<McapReader> open(const std::string& path);
+  /// `file`  as errors name it: in `folder`, or a path where that is empty.
+  static rr::Result<McapReader> open(const std::string& file, const std::string& folder = {});
 
   /// The next record of the data section; nullopt at its end. Records that hold neither data nor names have no content.
   /// The content is borrowed until the next call.
@@ -33,17 +34,17 @@ class McapReader {
   /// Why there is no further record, where the file does not end as it should; else empty.
   const std::string& cut() const { return cut_; }
   std::uint64_t size() const { return size_; }
-  const std::string& path() const { return path_; }
+  const std::string& file() const { return name_; }
 
   /// "run.mcap: chunk at byte 123: ..."
   rr::Error error_in(const McapRecord& record, std::string_view what) const;
 
  private:
-  explicit McapReader(std::string path) : path_(std::move(path)) {}
+  explicit McapReader(std::string name) : name_(std::move(name)) {}
   rr::Result<std::optional<McapRecord>> read_record();
   std::optional<McapRecord> end_at_cut(std::string why);
 
-  std::string path_;
+  std::string name_;
   std::ifstream file_;
   std::uint64_t size_ = 0;
   std::uint64_t at_ = 0;

@@ -54,25 +54,26 @@ constexpr std::array recorded_kinds{rr::MemberKind::wire, rr::MemberKind::pipe, 
 
 }  // namespace
 
-rr::Result<Recording> Recording::open(const std::string& path, const std::stop_token& unwanted) {
-  auto reader = McapReader::open(path);
+rr::Result<Recording> Recording::open(const std::string& file, const std::stop_token& unwanted,
+                                      const std::string& folder) {
+  auto reader = McapReader::open(file, folder);
   if (!reader) return reader.error();
   Recording out(std::move(*reader));
   for (;;) {
     if (unwanted.stop_requested())
-      return rr::make_error(rr::ErrorCode::operation_cancelled, path + ": is not wanted any more");
+      return rr::make_error(rr::ErrorCode::operation_cancelled, file + ": is not wanted any more");
     auto record = out.reader_.next();
     if (!record) return record.error();
     if (!*record) break;
     if (auto taken = out.take(**record); !taken) return out.reader_.error_in(**record, taken.error().message);
   }
   if (out.services_.empty())
-    return bad_recording(path + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
+    return bad_recording(file + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
                          "; was it recorded by rrgate?");
   for (const auto& [channel, member] : out.members_) {
     const auto is_its_service = [&, label = &member.service](const auto& service) { return service.label == *label; };
     if (std::none_of(out.services_.begin(), out.services_.end(), is_its_service))
-      return bad_recording(path + ": channel " + rr::quote(member.topic) + " is of service " +
+      return bad_recording(file + ": channel " + rr::quote(member.topic) + " is of service " +
                            rr::quote(member.service) + ", which the file does not hold");
   }
   return out;
@@ -226,7 +227,7 @@ rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const 
   else if (member.kind != rr::MemberKind::event && !document->contains("value"))
     problem = "has no \"value\"";
   if (problem.empty()) return document;
-  return bad_recording(path() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
+  return bad_recording(name() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
 }
 
 std::string recorded_ring(const std::string& path) {

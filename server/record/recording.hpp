@@ -36,9 +36,10 @@ struct RecordedChunk {
 
 class Recording {
  public:
-  /// Reads all of the file once. `unwanted`  asked at each record.
+  /// Reads all of the file once. `file`, `folder`  see McapReader. `unwanted`  asked at each record.
   /// Errors   those of McapReader; data_serialization_error: it is no recording of rrgate; operation_cancelled.
-  static rr::Result<Recording> open(const std::string& path, const std::stop_token& unwanted = {});
+  static rr::Result<Recording> open(const std::string& file, const std::stop_token& unwanted = {},
+                                    const std::string& folder = {});
 
   const std::vector<RecordedService>& services() const { return services_; }
   const std::map<std::uint16_t, RecordedMember>& members() const { return members_; }
@@ -48,7 +49,8 @@ class Recording {
   McapTime end() const { return end_; }
   /// See McapReader.
   const std::string& cut() const { return reader_.cut(); }
-  const std::string& path() const { return reader_.path(); }
+  /// The file, as open() was told it.
+  const std::string& name() const { return reader_.file(); }
   std::uint64_t size() const { return reader_.size(); }
   /// Bytes that are held for it, about, also while a chunk is read.
   std::size_t memory() const;

@@ -111,7 +111,7 @@ std::string Replay::listen(rr::Node& node) const {
 
 void Replay::add_control(rr::Node& node) {
   auto control = rr::Service::from_text({std::string(robdef_replay)}, control_name_, "Replay");
-  control->property("file").get([this] { return player_.recording().path(); });
+  control->property("file").get([this] { return player_.recording().name(); });
   control->property("speed").get([this] { return player_.state().speed; }).set([this](double speed) {
     if (!(speed >= Player::min_speed && speed <= Player::max_speed))
       throw out_of_range("speed " + std::to_string(speed) + ", expected 0.001 to 1000");
@@ -162,7 +162,7 @@ void Replay::play(const McapMessage& message, McapTime shift) {
           : rr::Result<>(document.error());
   if (played) return;
   const auto& topic = player_.recording().members().at(message.channel).topic;
-  auto what = document ? player_.recording().path() + ": " + topic + ", message " + std::to_string(message.sequence) +
+  auto what = document ? player_.recording().name() + ": " + topic + ", message " + std::to_string(message.sequence) +
                              ": " + played.error().message
                        : played.error().message;
   if (problems_.insert(message.channel).second) report(what);

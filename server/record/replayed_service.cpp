@@ -24,13 +24,13 @@ rr::Result<ReplayedService> ReplayedService::make(const Recording& recording, co
   try {
     out.service_ =
         rr::Service::from_text(recorded.definitions, recorded.service, recorded.type, rr::RobdefMode::compat);
-    out.service_->serve_partly("is not in the recording: this is a replay of " + recording.path());
+    out.service_->serve_partly("is not in the recording: this is a replay of " + recording.name());
     out.add_objects(recorded);
     for (const auto& [channel, member] : recording.members())
       if (member.service == recorded.label) out.add_member(member);
   } catch (const std::invalid_argument& problem) {
     return rr::make_error(rr::ErrorCode::data_serialization_error,
-                          recording.path() + ": service " + rr::quote(recorded.label) + ": " + problem.what());
+                          recording.name() + ": service " + rr::quote(recorded.label) + ": " + problem.what());
   }
   return out;
 }

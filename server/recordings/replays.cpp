@@ -40,7 +40,7 @@ struct Replays::Run {
 
   std::string name;  ///< of the device
   std::string folder;
-  std::string path;
+  std::string file;
   std::stop_source unwanted;  ///< for what opens it
   asio::io_context io{1};
   asio::steady_timer file_watch;
@@ -70,7 +70,7 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
     log(LogLevel::warning, "recording is played with gaps", {{"device", device}, {"error", problem}});
   };
   try {
-    auto recording = Recording::open(path, unwanted.get_token());
+    auto recording = Recording::open(file, unwanted.get_token(), folder);
     if (!recording) return recording.error();
     bytes = recording->memory();
     return std::make_unique<Replay>(io, std::move(*recording), std::move(how));
@@ -95,7 +95,7 @@ void Replays::Run::play(Replay& replay) {
 
 void Replays::Run::watch_file() {
   std::error_code error;
-  if (!fs::exists(path, error)) return io.stop();
+  if (!fs::exists(fs::path(folder) / file, error)) return io.stop();
   file_watch.expires_after(file_look_period);
   file_watch.async_wait([this](const auto& cancelled) {
     if (!cancelled) watch_file();
@@ -132,7 +132,7 @@ rr::Result<> Replays::begin(Run& run) {
     run.thread = std::thread(work);
   } catch (const std::exception& failure) {
     return rr::make_error(rr::ErrorCode::system_resource_error,
-                          "there is no thread to play " + run.path + ": " + failure.what());
+                          "there is no thread to play " + run.file + ": " + failure.what());
   }
   return {};
 }
@@ -151,7 +151,7 @@ rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) 
     const auto run = std::make_shared<Run>(executor_, memory_.sibling());
     run->name = name;
     run->folder = folder;
-    run->path = (fs::path(folder) / file).string();
+    run->file = file;
     found = runs_.emplace(name, run).first;
     if (const auto begun = begin(*run); !begun) {
       runs_.erase(found);
@@ -168,9 +168,13 @@ void Replays::note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size
   if (found == runs_.end() || found->second.get() != &run) return;  // ended meanwhile
   if (url && !run.memory.resize(bytes))
     url =
-        rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left to play " + run.path +
+        rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left to play " + run.file +
                                                                   ", which takes " + std::to_string(bytes) + " bytes");
-  if (!url) return end(found, url.error());
+  if (!url) {
+    log(LogLevel::warning, "recording can't be played",
+        {{"device", run.name}, {"folder", run.folder}, {"error", url.error().message}});
+    return end(found, url.error());
+  }
   DeviceConfig config;
   config.name = run.name;
   config.url = std::move(*url);

@@ -30,7 +30,8 @@ class Replays {
   /// Returns once the file is a device, by replay_of_file(). One that is played already goes on.
   /// Errors   invalid_state: so many are played already; member_busy: so many are still ending; resource_not_found:
   /// there is no such file; data_serialization_error, system_resource_error: a file that can't be played, or no thread;
-  /// out_of_system_resource: it takes more memory than is left; operation_cancelled: it was ended before it began.
+  /// out_of_system_resource: it takes more memory than is left; operation_cancelled: it was ended before it began. They
+  /// name the file, and not where it is: clients hear of them.
   rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
   /// Of a device that plays a recording. Its clients hear that its services end.
   void end(std::string_view device);

@@ -30,7 +30,7 @@ void read_messages(Recording& recording) {
     for (const auto& message : read->messages) {
       require(message.log_time >= recording.begin() && message.log_time <= recording.end(), "a message has its time");
       const auto document = recording.read_document(message);
-      if (!document) check_error(document.error(), recording.path());
+      if (!document) check_error(document.error(), recording.name());
     }
   }
   require(count == recording.message_count(), "messages are in chunks");

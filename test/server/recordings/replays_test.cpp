@@ -163,20 +163,23 @@ TEST_CASE("replays: a file that can't be played says why, and is no device") {
   const auto refused = made.play(damaged);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == rr::ErrorCode::data_serialization_error);
-  CHECK(refused.error().message.find("is no MCAP file") != std::string::npos);
-  const auto missing = made.play("arm.Robot.20261122T083000123Z.mcap");
+  CHECK(refused.error().message.starts_with(damaged + ": is no MCAP file"));  // and no folder
+  const std::string gone = "arm.Robot.20261122T083000123Z.mcap";
+  const auto missing = made.play(gone);
   REQUIRE_FALSE(missing);
   CHECK(missing.error().code == rr::ErrorCode::resource_not_found);
-  CHECK(missing.error().message.find("No such file") != std::string::npos);
+  CHECK(missing.error().message.starts_with(gone + ": can't be read: No such file"));
   CHECK(made.devices.all().empty());
   CHECK(made.replays->list().empty());
 }
 
 TEST_CASE("replays: one that takes more memory than is left is refused") {
   Played made(100);
-  const auto refused = made.play(made.write(1));
+  const auto file = made.write(1);
+  const auto refused = made.play(file);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
+  CHECK(refused.error().message.find(" memory left to play " + file) != std::string::npos);
   CHECK(made.devices.all().empty());
 }
 
@@ -188,7 +191,7 @@ TEST_CASE("replays: one for which there is no thread is refused, and can be play
     const auto refused = made.play(file);
     REQUIRE_FALSE(refused);
     CHECK(refused.error().code == rr::ErrorCode::system_resource_error);
-    CHECK(refused.error().message.find("there is no thread to play ") != std::string::npos);
+    CHECK(refused.error().message.find("there is no thread to play " + file) != std::string::npos);
   }
   CHECK(made.replays->list().empty());
   CHECK(made.play(file));
