@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t max_columns = 10'000;
 
 struct ExportOptions {
-  std::string file;
+  std::vector<std::string> files;
   std::string member;
   std::string output;
   bool is_csv = false;
@@ -136,15 +136,17 @@ const RecordedMember* find_member(const Recording& recording, const std::string&
 
 int run_export(const ExportOptions& options) {
   if (!options.is_csv && !options.is_json) return usage_error("export", "expected --csv or --json");
-  std::error_code error;
-  if (std::filesystem::equivalent(options.file, options.output, error))
-    return usage_error("export", options.output + " is the recording itself; -o takes another file");
-  auto recording = Recording::open(options.file);
+  for (const auto& file : options.files) {
+    std::error_code error;
+    if (std::filesystem::equivalent(file, options.output, error))
+      return usage_error("export", options.output + " is the recording itself; -o takes another file");
+  }
+  auto recording = Recording::open(options.files);
   if (!recording) return report_failure("export", recording.error().message);
   const auto* member = find_member(*recording, options.member);
   if (!member)
     return usage_error(
-        "export", options.file + ": " +
+        "export", recording->name() + ": " +
                       (options.member.empty() ? "more than one member" : "no one member " + rr::quote(options.member)) +
                       "; --member takes one of: " + topics_of(*recording));
   std::ofstream file;
@@ -161,7 +163,9 @@ int run_export(const ExportOptions& options) {
 
 void add_export(Commands& commands) {
   const auto [app, options] = commands.add("export", "Write a member of a recording as a table", run_export);
-  app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
+  app.add_option("FILE", options.files, "A file of \"rrgate record\", or all files of one recording")
+      ->required()
+      ->option_text("...");
   auto* csv = app.add_flag("--csv", options.is_csv, "One line for each message, one column for each number");
   app.add_flag("--json", options.is_json, "One line of JSON for each message")->excludes(csv);
   app.add_option("--member", options.member, "Member, as \"rrgate info FILE\" lists it: \"/Create/state\", \"state\"")

@@ -119,15 +119,22 @@ void print_description(const rr::OrderedJson& description) {
 }
 
 struct InfoOptions : RemoteOptions {
-  std::string object;
+  std::vector<std::string> more;  ///< of a service, the object; of a recording, its further files
 };
 
 int info(const InfoOptions& options) {
-  if (is_recording_file(options.url)) return print_recording(options.url, options.is_json);
+  if (is_recording_file(options.url)) {
+    std::vector<std::string> files{options.url};
+    files.insert(files.end(), options.more.begin(), options.more.end());
+    return print_recording(files, options.is_json);
+  }
+  if (options.more.size() > 1)
+    return usage_error("info", "expected one object or member, found also " + options.more[1]);
+  const auto object = options.more.empty() ? std::string() : options.more.front();
   return run_remote("info", options.url, [&] {
     const auto address = remote_address(options);
     const auto root = open_service(address);
-    const auto found = find_member(root, options.object);
+    const auto found = find_member(root, object);
     auto description = describe(found);
     if (is_device_of_gateway(options.url)) {
       try {
@@ -136,7 +143,7 @@ int info(const InfoOptions& options) {
         std::cerr << "rrgate info: the gateway does not tell of locks: " << refusal.what() << "\n";
       }
     }
-    if (options.object.empty()) description["attributes"] = attributes_of(root, found.types());
+    if (object.empty()) description["attributes"] = attributes_of(root, found.types());
     if (found.member) {  // one member alone
       auto& members = description["members"];
       const auto is_other = [&](const auto& each) { return each["name"] != found.member->name; };
@@ -175,7 +182,9 @@ void add_info(Commands& commands) {
   auto* const url =
       app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it, or a file of \"rrgate record\"");
   takes_websocket_url(url)->required()->option_text(" ");
-  app.add_option("OBJECT", options.object, "Path of an object or member; default: the root object")->option_text(" ");
+  app.add_option("OBJECT", options.more,
+                 "Path of an object or member; default: the root object. Of a recording: its further files")
+      ->option_text(" ");
   add_json(app, options);
   add_connection_options(app, options);
 }

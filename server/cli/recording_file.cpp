@@ -21,6 +21,7 @@ double seconds_between(McapTime from, McapTime to) {
 rr::OrderedJson describe(const Recording& recording) {
   rr::OrderedJson out;
   out["file"] = recording.name();
+  out["files"] = recording.files();
   out["bytes"] = recording.size();
   out["messages"] = recording.message_count();
   out["begin"] = mcap_time_text(recording.begin());
@@ -75,8 +76,8 @@ bool is_recording_file(const std::string& text) {
          (text.ends_with(".mcap") || std::filesystem::is_regular_file(text, error));
 }
 
-int print_recording(const std::string& path, bool is_json) {
-  const auto recording = Recording::open(path);
+int print_recording(const std::vector<std::string>& files, bool is_json) {
+  const auto recording = Recording::open(files);
   if (!recording) return report_failure("info", recording.error().message);
   const auto description = describe(*recording);
   if (is_json)

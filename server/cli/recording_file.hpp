@@ -2,12 +2,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace rrgate {
 
 /// Whether a word of the command line is a file and no URL.
 bool is_recording_file(const std::string& text);
-/// Prints what the file holds. Returns an exit code.
-int print_recording(const std::string& path, bool is_json);
+/// Prints what the files of a recording hold. Returns an exit code.
+int print_recording(const std::vector<std::string>& files, bool is_json);
 
 }  // namespace rrgate

@@ -14,7 +14,7 @@ namespace rrgate {
 namespace {
 
 struct ReplayCommandOptions {
-  std::string file;
+  std::vector<std::string> files;
   std::string listen = "rr+tcp://127.0.0.1:0";
   double speed = 1;
   double start = 0;
@@ -47,10 +47,10 @@ void serve(Replay& replay, boost::asio::io_context& io, const ReplayCommandOptio
 }
 
 int run_replay(const ReplayCommandOptions& options) {
-  auto recording = Recording::open(options.file);
+  auto recording = Recording::open(options.files);
   if (!recording) return report_failure("replay", recording.error().message);
   if (!recording->cut().empty())
-    std::cerr << "rrgate replay: " << options.file << " was cut: " << recording->cut()
+    std::cerr << "rrgate replay: " << recording->name() << " was cut: " << recording->cut()
               << "; all before that is played\n";
   ReplayOptions how;
   how.listen = options.listen;
@@ -71,7 +71,9 @@ int run_replay(const ReplayCommandOptions& options) {
 void add_replay(Commands& commands) {
   const auto [app, options] =
       commands.add("replay", "Serve a recording as if it were the recorded devices", run_replay);
-  app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
+  app.add_option("FILE", options.files, "A file of \"rrgate record\", or all files of one recording")
+      ->required()
+      ->option_text("...");
   app.add_option("--speed", options.speed, "Speed as a factor: 2 is twice as fast")
       ->check(CLI::Range(Player::min_speed, Player::max_speed))
       ->option_text("N [1]");

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <limits>
+#include <tuple>
 
 #include "core/support/node_id.hpp"
 #include "node/platform/utc_time.hpp"
@@ -54,18 +56,21 @@ constexpr std::array recorded_kinds{rr::MemberKind::wire, rr::MemberKind::pipe, 
 
 }  // namespace
 
+Recording::Recording(McapReader reader, std::string folder)
+    : folder_(std::move(folder)), files_{{reader.file()}}, reader_(std::move(reader)), size_(reader_->size()) {}
+
 rr::Result<Recording> Recording::open(const std::string& file, const std::stop_token& unwanted,
                                       const std::string& folder) {
   auto reader = McapReader::open(file, folder);
   if (!reader) return reader.error();
-  Recording out(std::move(*reader));
+  Recording out(std::move(*reader), folder);
   for (;;) {
     if (unwanted.stop_requested())
       return rr::make_error(rr::ErrorCode::operation_cancelled, file + ": is not wanted any more");
-    auto record = out.reader_.next();
+    auto record = out.reader_->next();
     if (!record) return record.error();
     if (!*record) break;
-    if (auto taken = out.take(**record); !taken) return out.reader_.error_in(**record, taken.error().message);
+    if (auto taken = out.take(**record); !taken) return out.reader_->error_in(**record, taken.error().message);
   }
   if (out.services_.empty())
     return bad_recording(file + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
@@ -76,9 +81,106 @@ rr::Result<Recording> Recording::open(const std::string& file, const std::stop_t
       return bad_recording(file + ": channel " + rr::quote(member.topic) + " is of service " +
                            rr::quote(member.service) + ", which the file does not hold");
   }
+  out.cut_ = out.reader_->cut();
   return out;
 }
 
+rr::Result<Recording> Recording::open(const std::vector<std::string>& files, const std::stop_token& unwanted,
+                                      const std::string& folder) {
+  if (files.size() == 1) return open(files.front(), unwanted, folder);
+  std::vector<Recording> parts;
+  for (const auto& file : files) {
+    auto part = open(file, unwanted, folder);
+    if (!part) return part.error();
+    part->reader_.reset();
+    if (!part->cut_.empty()) part->cut_ = file + " " + part->cut_;
+    parts.push_back(std::move(*part));
+  }
+  const auto is_before = [](const Recording& a, const Recording& b) {  // those without a message are the last
+    return a.message_count_ != 0 && (b.message_count_ == 0 || a.begin_ < b.begin_);
+  };
+  std::stable_sort(parts.begin(), parts.end(), is_before);
+  auto out = std::move(parts.front());
+  for (std::size_t i = 1; i < parts.size(); ++i)
+    if (auto added = out.add(std::move(parts[i])); !added) return added.error();
+  return out;
+}
+
+rr::Result<> Recording::add(Recording later) {
+  auto& file = files_.emplace_back(std::move(later.files_.front()));
+  if (later.message_count_ != 0 && later.begin_ < end_)
+    return bad_recording(file.name + ": begins before the end of " + files_[files_.size() - 2].name +
+                         ": they are of two recordings");
+  for (auto& service : later.services_)
+    if (auto added = add_service(std::move(service)); !added)
+      return bad_recording(file.name + ": " + added.error().message);
+  if (auto added = add_members(later, file); !added) return bad_recording(file.name + ": " + added.error().message);
+  for (auto& chunk : later.chunks_) {
+    chunk.file = files_.size() - 1;
+    std::map<std::uint16_t, std::uint64_t> counts;
+    for (const auto& [channel, count] : chunk.message_counts) counts[file.channel_of(channel)] += count;
+    chunk.message_counts = std::move(counts);
+    chunks_.push_back(std::move(chunk));
+  }
+  end_ = std::max(end_, later.end_);
+  message_count_ += later.message_count_;
+  size_ += later.size_;
+  if (!later.cut_.empty()) cut_ += (cut_.empty() ? "" : "; ") + later.cut_;
+  return {};
+}
+
+/// What it did not have before is added to what is known of it, as the recorder does.
+rr::Result<> Recording::add_service(RecordedService later) {
+  const auto is_same = [&](const RecordedService& other) { return other.label == later.label; };
+  const auto known = std::find_if(services_.begin(), services_.end(), is_same);
+  if (known == services_.end()) {
+    services_.push_back(std::move(later));
+    return {};
+  }
+  if (known->service != later.service || known->type != later.type)
+    return bad_recording("service " + rr::quote(later.label) + " is a " + later.type + ", and in the files before a " +
+                         known->type);
+  for (auto& definition : later.definitions)
+    if (std::find(known->definitions.begin(), known->definitions.end(), definition) == known->definitions.end())
+      known->definitions.push_back(std::move(definition));
+  known->objects.merge(later.objects);
+  return {};
+}
+
+rr::Result<> Recording::add_members(const Recording& later, File& file) {
+  const auto key_of = [](const RecordedMember& member) {
+    return std::tie(member.service, member.object, member.member, member.kind);
+  };
+  std::map<decltype(key_of(RecordedMember())), std::uint16_t> known;
+  for (const auto& [channel, member] : members_) known.emplace(key_of(member), channel);
+  for (const auto& [own, member] : later.members_) {
+    auto found = known.find(key_of(member));
+    if (found == known.end()) {
+      const auto is_taken = members_.contains(own);
+      const auto last = members_.empty() ? 0 : members_.rbegin()->first;
+      if (is_taken && last == std::numeric_limits<std::uint16_t>::max())
+        return bad_recording("with its channels there are more than 65535");
+      const auto channel = is_taken ? static_cast<std::uint16_t>(last + 1) : own;
+      auto& added = members_.emplace(channel, member).first->second;
+      added.channel = channel;
+      added.message_count = 0;
+      found = known.emplace(key_of(added), channel).first;
+    }
+    members_.at(found->second).message_count += member.message_count;
+    if (found->second != own) file.channels.emplace(own, found->second);
+  }
+  return {};
+}
+
+std::vector<std::string> Recording::files() const {
+  std::vector<std::string> out;
+  for (const auto& file : files_) out.push_back(file.name);
+  return out;
+}
+
+std::string Recording::name() const {
+  return files_.size() == 1 ? files_.front().name : files_.front().name + " to " + files_.back().name;
+}
 rr::Result<> Recording::take(const McapRecord& record) {
   switch (record.opcode) {
     case McapOpcode::channel:
@@ -141,7 +243,8 @@ rr::Result<> Recording::take_service(const McapRecord& record) {
 rr::Result<> Recording::take_chunk(const McapRecord& record) {
   auto records = McapChunkReader::open(record);
   if (!records) return records.error();
-  RecordedChunk chunk{record.offset};
+  RecordedChunk chunk;
+  chunk.offset = record.offset;
   chunk.bytes = record.content.size();
   for (;;) {
     const auto inner = records->next();
@@ -182,23 +285,39 @@ std::size_t Recording::memory() const {
   return out + 2 * largest;  // the reader has its bytes, and who reads them has
 }
 
+rr::Result<McapReader*> Recording::reader_of(std::size_t file) {
+  if (!reader_ || reader_file_ != file) {
+    auto opened = McapReader::open(files_[file].name, folder_);
+    if (!opened) return opened.error();
+    reader_.emplace(std::move(*opened));
+    reader_file_ = file;
+  }
+  return &*reader_;
+}
+
 rr::Result<Recording::Messages> Recording::read(const RecordedChunk& chunk) {
-  const auto record = reader_.read_at(chunk.offset);
+  const auto found = reader_of(chunk.file);
+  if (!found) return found.error();
+  const auto& reader = **found;
+  const auto& file = files_[chunk.file];
+  const auto record = (*found)->read_at(chunk.offset);
   if (!record) return record.error();
   Messages out{rr::Bytes(record->content.begin(), record->content.end()), {}};
   auto whole = *record;
   whole.content = out.bytes;
   auto records = McapChunkReader::open(whole);
-  if (!records) return reader_.error_in(whole, records.error().message);
+  if (!records) return reader.error_in(whole, records.error().message);
   for (;;) {
     const auto inner = records->next();
-    if (!inner) return reader_.error_in(whole, inner.error().message);
+    if (!inner) return reader.error_in(whole, inner.error().message);
     if (!*inner) break;
     if ((*inner)->opcode != McapOpcode::message) continue;
     const auto message = parse_mcap_message((*inner)->content);
-    if (!message) return reader_.error_in(whole, message.error().message);
-    if (!members_.contains(message->channel)) return reader_.error_in(whole, "has changed since it was opened");
+    if (!message) return reader.error_in(whole, message.error().message);
     out.messages.push_back(*message);
+    auto& channel = out.messages.back().channel;
+    channel = file.channel_of(channel);
+    if (!members_.contains(channel)) return reader.error_in(whole, "has changed since it was opened");
   }
   return out;
 }

@@ -103,8 +103,14 @@ std::string recording_of_file(std::string_view file) {
   return number_of_file(file, name) > 0 && parse_recording_name(name) ? name : std::string();
 }
 
+std::string replay_of(std::string_view recording) {
+  return replay_name(recording);
+}
+
 std::string replay_of_file(std::string_view file) {
-  return replay_name(file.substr(0, file.rfind(extension)));
+  std::string name;
+  const auto number = number_of_file(file, name);
+  return number > 0 ? replay_name(name + "-" + std::to_string(number)) : std::string();
 }
 
 std::string recording_of_replay(std::string_view device) {

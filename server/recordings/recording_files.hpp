@@ -37,9 +37,11 @@ std::string first_file_of(std::string_view recording);
 /// The recording that a file of this name is of; empty: of none.
 std::string recording_of_file(std::string_view file);
 
-/// The device that plays a file of a recording.
+/// The device that plays a recording.
+std::string replay_of(std::string_view recording);
+/// The device that plays one file of a recording alone: "replay~NAME-1", "replay~NAME-2". Empty: of no recording.
 std::string replay_of_file(std::string_view file);
-/// The recording that a device plays a file of; empty: it plays none.
+/// The recording that a device plays, or a file of which; empty: it plays none.
 std::string recording_of_replay(std::string_view device);
 
 /// Of recordings by their names, each list oldest first.

@@ -448,7 +448,7 @@ rr::awaitable<rr::Result<>> Recordings::remove(std::string name) {
       co_return rr::make_error(rr::ErrorCode::invalid_state, "the recording is under way; stop it first");
     runs_.erase(run);
   }
-  for (const auto& file : info->files) replays_.end(replay_of_file(file.name));
+  replays_.end_all_of(name);
   const auto work = [files = info->files, where = config_.recordings.folder]() -> rr::Result<> {
     for (const auto& file : files) {
       std::error_code error;

@@ -33,14 +33,14 @@ rr::Error replay_ended() {
 
 }  // namespace
 
-/// One file. Its thread has `io` and what runs there; all else is the gateway's.
+/// One recording. Its thread has `io` and what runs there; all else is the gateway's.
 struct Replays::Run {
   Run(const asio::any_io_executor& executor, MemoryBudget::Charge charge)
       : file_watch(io), known(executor, asio::steady_timer::time_point::max()), memory(std::move(charge)) {}
 
   std::string name;  ///< of the device
   std::string folder;
-  std::string file;
+  std::vector<std::string> files;
   std::stop_source unwanted;  ///< for what opens it
   asio::io_context io{1};
   asio::steady_timer file_watch;
@@ -58,7 +58,7 @@ struct Replays::Run {
 
   rr::Result<std::unique_ptr<Replay>> open(std::size_t& bytes);
   void play(Replay& replay);
-  void watch_file();
+  void watch_files();
 };
 
 // --- on the thread of one ---
@@ -70,7 +70,7 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
     log(LogLevel::warning, "recording is played with gaps", {{"device", device}, {"error", problem}});
   };
   try {
-    auto recording = Recording::open(file, unwanted.get_token(), folder);
+    auto recording = Recording::open(files, unwanted.get_token(), folder);
     if (!recording) return recording.error();
     bytes = recording->memory();
     return std::make_unique<Replay>(io, std::move(*recording), std::move(how));
@@ -82,7 +82,7 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
 void Replays::Run::play(Replay& replay) {
   try {
     replay.player().play();
-    watch_file();
+    watch_files();
     io.run();  // until it is stopped
     file_watch.cancel();
     replay.stop();
@@ -93,12 +93,14 @@ void Replays::Run::play(Replay& replay) {
   }
 }
 
-void Replays::Run::watch_file() {
-  std::error_code error;
-  if (!fs::exists(fs::path(folder) / file, error)) return io.stop();
+void Replays::Run::watch_files() {
+  for (const auto& file : files) {
+    std::error_code error;
+    if (!fs::exists(fs::path(folder) / file, error)) return io.stop();
+  }
   file_watch.expires_after(file_look_period);
   file_watch.async_wait([this](const auto& cancelled) {
-    if (!cancelled) watch_file();
+    if (!cancelled) watch_files();
   });
 }
 
@@ -132,14 +134,13 @@ rr::Result<> Replays::begin(Run& run) {
     run.thread = std::thread(work);
   } catch (const std::exception& failure) {
     return rr::make_error(rr::ErrorCode::system_resource_error,
-                          "there is no thread to play " + run.file + ": " + failure.what());
+                          "there is no thread to play " + run.files.front() + ": " + failure.what());
   }
   return {};
 }
 
-rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) {
-  const auto name = replay_of_file(file);
-  auto found = runs_.find(name);
+rr::awaitable<rr::Result<>> Replays::play(std::string device, std::string folder, std::vector<std::string> files) {
+  auto found = runs_.find(device);
   if (found == runs_.end()) {
     if (is_stopped_) co_return replay_ended();
     if (runs_.size() >= most)
@@ -149,10 +150,10 @@ rr::awaitable<rr::Result<>> Replays::play(std::string folder, std::string file) 
       co_return rr::make_error(rr::ErrorCode::member_busy,
                                "as many recordings as may be played (" + std::to_string(most) + ") are still ending");
     const auto run = std::make_shared<Run>(executor_, memory_.sibling());
-    run->name = name;
+    run->name = device;
     run->folder = folder;
-    run->file = file;
-    found = runs_.emplace(name, run).first;
+    run->files = std::move(files);
+    found = runs_.emplace(device, run).first;
     if (const auto begun = begin(*run); !begun) {
       runs_.erase(found);
       co_return begun.error();
@@ -167,9 +168,9 @@ void Replays::note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size
   const auto found = runs_.find(run.name);
   if (found == runs_.end() || found->second.get() != &run) return;  // ended meanwhile
   if (url && !run.memory.resize(bytes))
-    url =
-        rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left to play " + run.file +
-                                                                  ", which takes " + std::to_string(bytes) + " bytes");
+    url = rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left to play " +
+                                                                    run.files.front() + ", which takes " +
+                                                                    std::to_string(bytes) + " bytes");
   if (!url) {
     log(LogLevel::warning, "recording can't be played",
         {{"device", run.name}, {"folder", run.folder}, {"error", url.error().message}});
@@ -187,6 +188,14 @@ void Replays::note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size
 
 void Replays::end(std::string_view device) {
   if (const auto found = runs_.find(device); found != runs_.end()) end(found, replay_ended());
+}
+
+void Replays::end_all_of(std::string_view recording) {
+  for (auto at = runs_.begin(); at != runs_.end();) {
+    const auto next = std::next(at);
+    if (recording_of_replay(at->first) == recording) end(at, replay_ended());
+    at = next;
+  }
 }
 
 /// `why`  for those who wait for it to begin.

@@ -15,7 +15,7 @@
 namespace rrgate {
 
 /// For the gateway's thread. A recording is read and served on a thread of its own, by a node that the gateway shares
-/// as it shares a device. It ends by itself when its file has gone.
+/// as it shares a device. It ends by itself when one of its files has gone.
 class Replays {
  public:
   static constexpr std::size_t most = 4;  ///< at a time
@@ -27,14 +27,16 @@ class Replays {
   Replays(const Replays&) = delete;
   Replays& operator=(const Replays&) = delete;
 
-  /// Returns once the file is a device, by replay_of_file(). One that is played already goes on.
+  /// Returns once the files are a device of that name, as one time line. One that is played already goes on.
   /// Errors   invalid_state: so many are played already; member_busy: so many are still ending; resource_not_found:
   /// there is no such file; data_serialization_error, system_resource_error: a file that can't be played, or no thread;
   /// out_of_system_resource: it takes more memory than is left; operation_cancelled: it was ended before it began. They
-  /// name the file, and not where it is: clients hear of them.
-  rr::awaitable<rr::Result<>> play(std::string folder, std::string file);
+  /// name files, and not where they are: clients hear of them.
+  rr::awaitable<rr::Result<>> play(std::string device, std::string folder, std::vector<std::string> files);
   /// Of a device that plays a recording. Its clients hear that its services end.
   void end(std::string_view device);
+  /// Of a recording, and of its files.
+  void end_all_of(std::string_view recording);
   /// Whether it is a device: not while its file is still read.
   bool is_playing(std::string_view device) const;
   /// The devices, and what will be some.

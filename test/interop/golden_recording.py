@@ -3,6 +3,7 @@ import base64
 import json
 
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from processes import ROOT
 
@@ -22,6 +23,22 @@ def read_messages():
 
 
 MESSAGES = read_messages()
+
+
+def write_later(path, seconds):
+    """The same so much later, as the mcap package writes it: its channels have other numbers."""
+    with open(FILE, "rb") as file, open(path, "wb") as out:
+        reader, writer = make_reader(file), Writer(out, compression=CompressionType.NONE)
+        writer.start()
+        for each in reader.iter_metadata():
+            writer.add_metadata(each.name, each.metadata)
+        channels = {}
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.id not in channels:
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, 0, channel.metadata)
+            later = {"log_time": message.log_time + seconds * 10**9, "publish_time": message.publish_time + seconds * 10**9}
+            writer.add_message(channels[channel.id], data=message.data, sequence=message.sequence, **later)
+        writer.finish()
 
 
 def plain(value):

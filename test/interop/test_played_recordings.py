@@ -3,7 +3,7 @@ import json
 import shutil
 import time
 
-from golden_recording import DEADLINE, FILE, MESSAGES, plain
+from golden_recording import DEADLINE, FILE, MESSAGES, plain, write_later
 from http_api import ask
 from json_sockets import Socket
 from recordings import API, begin_gateway, create, listed, wait_for  # noqa: F401 (fixtures)
@@ -38,6 +38,12 @@ def devices(gateway, headers={}):
     return {each["name"]: each for each in ask(gateway.port, "GET", DEVICES, headers=headers).json["devices"]}
 
 
+def replays(gateway):
+    """Of the one recording, and of each of its files."""
+    [recording] = listed(gateway)
+    return [recording["replay"], *(each["replay"] for each in recording["files"])]
+
+
 def wait_until_online(gateway, device=DEVICE):
     return wait_for(lambda: devices(gateway).get(device), lambda seen: seen and seen["state"] == "online" and seen["services"])
 
@@ -50,7 +56,7 @@ def is_in_order(part, whole):
 
 def test_a_recording_that_is_played_is_a_device_that_says_so(create, begin_gateway):
     gateway = begin_gateway(create)
-    put_recordings(gateway, NAME, f"{NAME}-2")
+    write_later(put_recordings(gateway, NAME) / f"{NAME}-2.mcap", 60)
     answer = play(gateway)
     assert answer.json == {"device": DEVICE} and answer.headers["Location"] == f"{DEVICES}/{DEVICE}"
     seen = wait_until_online(gateway)
@@ -60,13 +66,16 @@ def test_a_recording_that_is_played_is_a_device_that_says_so(create, begin_gatew
     assert play(gateway, status=200).json == {"device": DEVICE}
     second = play(gateway, f"{NAME}-2.mcap").json["device"]
     assert second == f"{DEVICE}-2" and wait_until_online(gateway, second)["recording"] == NAME
-    files = listed(gateway)[0]["files"]
-    assert [each["replay"] for each in files] == [DEVICE, second]
+    assert replays(gateway) == [DEVICE, None, second]
     end(gateway, f"{NAME}-2.mcap")
     assert devices(gateway).keys() == {"create", DEVICE}
     end(gateway)
     end(gateway)
-    assert devices(gateway).keys() == {"create"} and [each["replay"] for each in listed(gateway)[0]["files"]] == [None, None]
+    assert devices(gateway).keys() == {"create"} and replays(gateway) == [None, None, None]
+    assert play(gateway, f"{NAME}.mcap").json["device"] == f"{DEVICE}-1"
+    assert replays(gateway) == [None, f"{DEVICE}-1", None]
+    end(gateway)
+    assert replays(gateway) == [None, None, None]
     play(gateway, f"{NAME}-3.mcap", 404)
     play(gateway, "create.Create.20200101T000000000Z", 404)
 
@@ -87,6 +96,24 @@ def test_http_hears_what_was_recorded_with_its_time_stamps(create, begin_gateway
     assert refused.status == 501 and refused.json["detail"].endswith(f"this is a replay of {NAME}.mcap")
     assert ask(gateway.port, "GET", f"{DEVICES}/{DEVICE}/replay/file").json == f"{NAME}.mcap"  # and not where it is
     assert ask(gateway.port, "POST", API, {"device": DEVICE, "service": "Create"}).status == 409  # it is recorded already
+
+
+def test_a_recording_of_several_files_is_one_time_line(create, begin_gateway):
+    gateway = begin_gateway(create)
+    write_later(put_recordings(gateway, NAME) / f"{NAME}-2.mcap", 60)
+    play(gateway)
+    wait_until_online(gateway)
+    replay, state = f"{DEVICES}/{DEVICE}/replay", f"{DEVICES}/{DEVICE}/Create/state"
+    assert ask(gateway.port, "GET", f"{replay}/file").json == f"{NAME}.mcap to {NAME}-2.mcap"
+    told = ask(gateway.port, "GET", f"{replay}/state").json
+    assert 60 < told["duration"] < 120
+    for position in 60, 0, told["duration"]:
+        assert ask(gateway.port, "POST", f"{replay}/pause", {}).status == 200
+        assert ask(gateway.port, "POST", f"{replay}/seek", {"position": position}).status == 200
+        at = ask(gateway.port, "GET", f"{replay}/state").json["position"]
+        assert abs(at - position) < 1e-6
+    assert ask(gateway.port, "POST", f"{replay}/step", {"messages": 1}).status == 200
+    assert ask(gateway.port, "GET", state).json == STATES[-1][1]
 
 
 def test_the_real_package_hears_what_was_recorded_and_goes_to_another_time(create, begin_gateway, node):

@@ -365,6 +365,27 @@ def test_a_long_recording_goes_on_in_further_files_and_the_oldest_go(create, tmp
     assert all(len(messages(file)) > 0 for file in files)
 
 
+def test_the_files_of_a_recording_are_described_exported_and_replayed_as_one(create, node, tmp_path):
+    rrgate("record", create, "-o", tmp_path / "run.mcap", "--members", "state", "--duration", "3", "--max-size", "0.008")
+    files = sorted(tmp_path.glob("run*.mcap"), key=lambda file: messages(file)[0][1])
+    each = [[document["value"] for _, _, document in messages(file)] for file in files]
+    assert len(files) > 2 and files[0].name == "run.mcap"
+    shuffled = [files[-1], *files[:-1]]
+    told = json.loads(rrgate("info", *shuffled, "--json"))
+    assert told["files"] == [str(file) for file in files] and told["file"] == f"{files[0]} to {files[-1]}"
+    assert told["messages"] == sum(map(len, each)) and 2 < told["seconds"] < 4
+    assert told["services"][0]["members"][0]["messages"] == told["messages"]
+    lines = rrgate("export", *shuffled, "--json", "--member", "state").splitlines()
+    assert [json.loads(line)["value"] for line in lines] == sum(each, [])
+    with Replay(node, tmp_path, shuffled[0], *shuffled[1:], "--paused") as replay:
+        assert abs(replay.control.state.PeekInValue()[0].duration - told["seconds"]) < 1e-6
+        replay.control.step(told["messages"])
+        last = node.ConnectService(replay.url).state.PeekInValue()[0]
+        assert last.x == each[-1][-1]["x"]
+    twice = rrgate("replay", files[1], files[0], files[1], code=1)
+    assert "begins before the end of" in twice and "they are of two recordings" in twice
+
+
 def test_a_size_that_definitions_exceed_is_told_and_files_hold_messages_all_the_same(create, tmp_path):
     done = subprocess.run([RRGATE, "record", create, "-o", tmp_path / "run.mcap", "--members", "state", "--duration", "2",
                            "--max-size", "0.001"], capture_output=True, text=True, timeout=60)

@@ -14,6 +14,7 @@ const given = {
   seconds: 2,
   messages: 7,
   bytes: 3,
+  replay: null,
   files: [{ name: "create.Create.20261125T083000123Z.mcap", bytes: 3, replay: null }, null],
 };
 
@@ -29,10 +30,12 @@ describe("recordings", () => {
   it("are those that the gateway tells of, as far as it does", () => {
     const { enabled, bytes, list } = readRecordings({ enabled: true, bytes: 3, recordings: [given, 1] });
     expect([enabled, bytes, list.length]).toEqual([true, 3, 1]);
-    expect(list[0]).toMatchObject({ beginMs: 1500, problem: "", files: [{ bytes: 3, replay: "" }] });
+    expect(list[0]).toMatchObject({ beginMs: 1500, problem: "", replay: "", files: [{ bytes: 3 }] });
+    const played = [{ replay: "replay~r" }, { files: [{}, { replay: "replay~r-2" }] }];
+    expect(readRecordings({ recordings: played }).list.map(({ replay }) => replay)).toEqual(["replay~r", "replay~r-2"]);
     expect(list[0] && isUnderWay(list[0])).toBe(true);
     expect(readRecordings(null)).toEqual({ enabled: false, bytes: 0, maxBytes: 0, list: [] });
-    expect(fileAddress({ name: "a b.mcap", bytes: 1, replay: "" })).toBe("api/v1/recordings/a%20b.mcap");
+    expect(fileAddress({ name: "a b.mcap", bytes: 1 })).toBe("api/v1/recordings/a%20b.mcap");
     expect([0, 999, 1000, 123456, 2.5e9].map(bytesText)).toEqual(["0 B", "999 B", "1.0 kB", "123 kB", "2.5 GB"]);
   });
 
@@ -54,17 +57,16 @@ describe("recordings", () => {
     await desk.end(recording);
     expect(desk.trouble.value).toBeNull();
     await desk.remove(recording);
-    const file = { name: "a.mcap", bytes: 1, replay: "" };
-    await desk.play(file);
-    await desk.endPlaying(file);
+    await desk.play(recording);
+    await desk.endPlaying(recording);
     desk.stop();
     const asked = fetch.mock.calls.filter(([, init]) => init?.method !== undefined);
     expect(asked.map(([path, init]) => [init?.method, path, init?.body])).toEqual([
       ["POST", "api/v1/recordings", '{"device":"create","service":"Create"}'],
       ["POST", `api/v1/recordings/${given.name}/stop`, "{}"],
       ["DELETE", `api/v1/recordings/${given.name}`, undefined],
-      ["POST", "api/v1/recordings/a.mcap/play", "{}"],
-      ["DELETE", "api/v1/recordings/a.mcap/play", undefined],
+      ["POST", `api/v1/recordings/${given.name}/play`, "{}"],
+      ["DELETE", `api/v1/recordings/${given.name}/play`, undefined],
     ]);
   });
 });

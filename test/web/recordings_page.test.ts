@@ -16,6 +16,7 @@ const recording = {
   seconds: 1,
   bytes: 10,
   files: [],
+  replay: "",
 };
 
 test("a recording is not deleted by a second click where the first one was", async () => {
@@ -41,18 +42,16 @@ test("a recording is not deleted by a second click where the first one was", asy
   expect(desk.remove).toHaveBeenCalledWith(recording);
 });
 
-test("a recording is played, shown and ended, unless four are played already", async () => {
-  const files = [1, 2, 3, 4, 5].map((part) => ({ name: `r${part}.mcap`, bytes: 1, replay: "" }));
-  const state = (playing: number) => ({
-    enabled: true,
-    bytes: 10,
-    maxBytes: 100,
-    list: [
-      { ...recording, files: files.map((file, i) => (i < playing ? { ...file, replay: `replay~r${i + 1}` } : file)) },
-    ],
-  });
+test("a recording is played as a whole, shown and ended, unless four are played already", async () => {
+  const files = ["a.mcap", "a-2.mcap"].map((name) => ({ name, bytes: 1 }));
+  const list = (playing: number) =>
+    [1, 2, 3, 4, 5].map((number) => ({
+      ...recording,
+      ...{ name: `r${number}`, files, replay: number <= playing ? `replay~r${number}` : "" },
+    }));
+  const state = (playing: number) => ({ enabled: true, bytes: 10, maxBytes: 100, list: list(playing) });
   const desk = {
-    state: new Store(state(3)),
+    state: new Store(state(4)),
     trouble: new Store(null),
     start: () => undefined,
     stop: () => undefined,
@@ -61,20 +60,20 @@ test("a recording is played, shown and ended, unless four are played already", a
   };
   show(RecordingsPage, { desk, list: { state: new Store({ kind: "loading" }) } } as never);
   await settle();
-  await press("Play part 5");
-  expect(desk.play).toHaveBeenCalledWith(files[4]);
-  const link = [...document.querySelectorAll("a")].find((each) => each.textContent === "Show part 1");
+  expect(button("Play").disabled).toBe(true); // that of the fifth, and one for both of its files
+  expect(button("Play").title).toBe("4 recordings are played already; stop one of them first");
+  const link = [...document.querySelectorAll("a")].find((each) => each.textContent === "Show the recording");
   expect(link?.getAttribute("href")).toBe("#/devices/replay~r1/robot");
-  await press("Stop playing part 1");
-  expect(desk.endPlaying).toHaveBeenCalledWith({ ...files[0], replay: "replay~r1" });
-  desk.state.value = state(4);
+  desk.state.value = { ...state(1), list: list(1).slice(0, 2) };
   await settle();
-  expect(button("Play part 5").disabled).toBe(true);
-  expect(button("Play part 5").title).toBe("4 recordings are played already; stop one of them first");
+  await press("Play");
+  expect(desk.play).toHaveBeenCalledWith(list(1)[1]);
+  await press("Stop playing");
+  expect(desk.endPlaying).toHaveBeenCalledWith(list(1)[0]);
 });
 
 test("a recording whose playing has not begun yet is not played again", async () => {
-  const file = { name: "r1.mcap", bytes: 1, replay: "" };
+  const file = { name: "r1.mcap", bytes: 1 };
   let begun = (): void => undefined;
   const desk = {
     state: new Store({ enabled: true, bytes: 10, maxBytes: 100, list: [{ ...recording, files: [file] }] }),

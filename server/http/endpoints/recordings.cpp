@@ -39,12 +39,13 @@ Json described(GatewayState& gateway, const RecordingInfo& recording) {
   out["seconds"] = std::max(0.0, seconds(recording.end - recording.begin));
   out["messages"] = recording.messages ? Json(*recording.messages) : Json();
   out["bytes"] = recording.bytes();
+  const auto played = [&gateway](std::string device) {
+    return gateway.recordings().replays().is_playing(device) ? Json(std::move(device)) : Json();
+  };
+  out["replay"] = played(replay_of(recording.name));
   auto& files = out["files"] = Json::array();
-  for (const auto& file : recording.files) {
-    const auto replay = replay_of_file(file.name);
-    const bool is_playing = gateway.recordings().replays().is_playing(replay);
-    files.push_back({{"name", file.name}, {"bytes", file.bytes}, {"replay", is_playing ? Json(replay) : Json()}});
-  }
+  for (const auto& file : recording.files)
+    files.push_back({{"name", file.name}, {"bytes", file.bytes}, {"replay", played(replay_of_file(file.name))}});
   return out;
 }
 
@@ -262,13 +263,14 @@ RecordingsAnswer play_recording(GatewayState& gateway, const Request& request, R
   auto& recordings = gateway.recordings();
   const auto found = co_await recordings.find_for(gateway.access(), request.identity, place.name);
   if (!found) co_return refuse_finder(gateway, request, found.error());
-  const auto* first = found->files.empty() ? nullptr : &found->files.front();
-  const auto* file = place.file.empty() ? first : find_file(*found, place.file);
-  if (!file) co_return no_such_file(place.file);
-  const auto device = replay_of_file(file->name);
+  std::vector<std::string> files;
+  for (const auto& file : found->files)
+    if (place.file.empty() || file.name == place.file) files.push_back(file.name);
+  if (files.empty()) co_return no_such_file(place.file);
+  const auto device = place.file.empty() ? replay_of(place.name) : replay_of_file(place.file);
   const bool is_new = !recordings.replays().is_playing(device);
   const auto entry = begin_entry(gateway, request, *found, "recording_played");
-  auto begun = co_await recordings.replays().play(gateway.config().recordings.folder, file->name);
+  auto begun = co_await recordings.replays().play(device, gateway.config().recordings.folder, std::move(files));
   const auto why = begun ? rr::Error{} : begun.error();
   if (why.code == rr::ErrorCode::invalid_state)
     begun = rr::make_error(why.code, why.message + ": " + names_of_replays(gateway, request.identity));
@@ -284,8 +286,10 @@ RecordingsAnswer end_playing(GatewayState& gateway, const Request& request, Reco
   if (!found) co_return refuse_finder(gateway, request, found.error());
   if (!place.file.empty() && !find_file(*found, place.file)) co_return no_such_file(place.file);
   const auto entry = begin_entry(gateway, request, *found, "recording_play_ended");
-  for (const auto& file : found->files)
-    if (place.file.empty() || file.name == place.file) gateway.recordings().replays().end(replay_of_file(file.name));
+  if (place.file.empty())
+    gateway.recordings().replays().end_all_of(place.name);
+  else
+    gateway.recordings().replays().end(replay_of_file(place.file));
   const rr::Result<> done;
   Response response;
   response.status = 204;

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <fstream>
+#include <functional>
 #include <stop_token>
 
 #include "server/json/schema.hpp"
@@ -155,6 +158,102 @@ TEST_CASE("the files that follow leave those of an earlier recording alone, unle
   CHECK(std::filesystem::file_size(earlier) == 12);
   CHECK(record_much(true) == earlier);
   CHECK(std::filesystem::file_size(earlier) > 12);
+}
+
+TEST_CASE("the files of a recording are one time line, however they are given") {
+  const test::Folder folder;
+  Recorded robot;
+  RecordingOptions options;
+  options.max_bytes = 10'000;
+  auto writer = robot.write(folder.path("a.mcap"), options);
+  const auto pose = robot.add(writer, "pose");
+  for (int i = 0; i < 900; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+  robot.service.objects["Robot.arm"] = "com.x.Robot";  // found late
+  REQUIRE(writer.add_service(robot.service));
+  const auto moved = robot.add(writer, "moved");
+  for (int i = 900; i < 1000; ++i) REQUIRE(writer.write(moved, {{"count", i}}, {}, {i, 0}));
+  REQUIRE(writer.close());
+  std::vector<std::string> files;
+  for (const auto& each : std::filesystem::directory_iterator(folder.path("")))
+    files.push_back(each.path().filename().string());
+  REQUIRE(files.size() > 3);
+  std::sort(files.begin(), files.end(), std::greater<>());
+
+  auto recording = Recording::open(files, {}, folder.path("")).value();
+  std::vector<std::string> expected;
+  for (int i = 0; i < 1000; ++i)
+    expected.push_back((i < 900 ? R"({"value":)" : R"({"count":)") + std::to_string(i) + "}");
+  CHECK(documents(recording) == expected);
+  CHECK(recording.message_count() == 1000);
+  CHECK(recording.begin() == 0);
+  CHECK(recording.end() == 999'000'000'000u);
+  CHECK(recording.size() == writer.size());
+  REQUIRE(recording.members().size() == 2);
+  CHECK(recording.members().at(pose).message_count == 900);
+  CHECK(recording.members().at(moved).message_count == 100);
+  REQUIRE(recording.services().size() == 1);
+  CHECK(recording.services()[0].objects.size() == 2);
+  CHECK(recording.files().size() == files.size());
+  CHECK(recording.files().front() == "a.mcap");
+  CHECK(recording.name() == "a.mcap to a-" + std::to_string(files.size()) + ".mcap");
+  std::vector<std::string> counts;
+  REQUIRE(recording.for_each(recording.members().at(moved), [&](const McapMessage& message) -> rr::Result<> {
+    counts.push_back(recording.read_document(message).value().dump());
+    return {};
+  }));
+  CHECK(counts == std::vector<std::string>(expected.begin() + 900, expected.end()));
+}
+
+TEST_CASE("files of a recording go together by what they recorded, whatever numbers their channels have") {
+  const test::Folder folder;
+  const auto record = [&](const std::string& path, const std::vector<const char*>& members, int second) {
+    Recorded robot;
+    auto writer = robot.write(path);
+    for (const auto* member : members) REQUIRE(writer.write(robot.add(writer, member), value(second), {}, {second, 0}));
+    REQUIRE(writer.close());
+    return path;
+  };
+  const auto late = record(folder.path("late.mcap"), {"picture", "matrix", "pose"}, 2);
+  const auto early = record(folder.path("early.mcap"), {"pose", "picture"}, 1);
+  auto recording = Recording::open(std::vector<std::string>{late, early}).value();
+  std::vector<std::string> topics;
+  for (const auto& chunk : recording.chunks()) {
+    const auto read = recording.read(chunk).value();
+    for (const auto& message : read.messages) topics.push_back(recording.members().at(message.channel).topic);
+  }
+  CHECK(topics ==
+        std::vector<std::string>{"/Robot/pose", "/Robot/picture", "/Robot/picture", "/Robot/matrix", "/Robot/pose"});
+  CHECK(recording.members().size() == 3);
+  for (const auto& [channel, member] : recording.members()) {
+    CHECK(member.channel == channel);
+    CHECK(member.message_count == (member.member == "matrix" ? 1 : 2));
+  }
+}
+
+TEST_CASE("files that are of no one recording are refused, and those that were cut are named") {
+  const test::Folder folder;
+  Recorded robot;
+  const auto record = [&](const char* name, int from, int to) {
+    auto writer = robot.write(folder.path(name));
+    const auto pose = robot.add(writer, "pose");
+    for (const int second : {from, to}) REQUIRE(writer.write(pose, value(second), {}, {second, 0}));
+    REQUIRE(writer.close());
+  };
+  const auto open = [&](const std::vector<std::string>& files) { return Recording::open(files, {}, folder.path("")); };
+  record("a.mcap", 1, 3);
+  record("b.mcap", 2, 4);
+  CHECK(open({"b.mcap", "a.mcap"}).error().message ==
+        "b.mcap: begins before the end of a.mcap: they are of two recordings");
+  robot.service.type = "com.x.Other";
+  record("c.mcap", 5, 6);
+  CHECK(open({"a.mcap", "c.mcap"}).error().message ==
+        "c.mcap: service 'Robot' is a com.x.Other, and in the files before a com.x.Robot");
+  CHECK(open({"a.mcap", "none.mcap"}).error().message.starts_with("none.mcap: can't be read"));
+  robot.service.type = "com.x.Robot";
+  record("d.mcap", 3, 6);  // at the moment when the one before ends
+  CHECK(open({"d.mcap", "a.mcap"}).value().message_count() == 4);
+  std::filesystem::resize_file(folder.path("a.mcap"), std::filesystem::file_size(folder.path("a.mcap")) / 2);
+  CHECK(open({"d.mcap", "a.mcap"}).value().cut().starts_with("a.mcap ends at byte "));
 }
 
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {

@@ -144,7 +144,8 @@ struct DevFile {
   RecordingWriter writer;
   RecordedService service = {};
 
-  explicit DevFile(const test::Folder& folder) : writer(RecordingWriter::create(folder.path("by hand.mcap")).value()) {
+  explicit DevFile(const test::Folder& folder, const std::string& name = "by hand.mcap")
+      : writer(RecordingWriter::create(folder.path(name)).value()) {
     REQUIRE(types.add({definition}, rr::RobdefMode::strict));
     add_service("Dev");
   }
@@ -329,6 +330,48 @@ TEST_CASE("what a wire sends after the replay went back is newer than all before
   CHECK(stamps.size() >= 11);
   CHECK(std::is_sorted(stamps.begin(), stamps.end(), std::less_equal<>()));
   CHECK(std::adjacent_find(stamps.begin(), stamps.end()) == stamps.end());
+}
+
+TEST_CASE("a recording of several files plays, goes to any time and begins again as one") {
+  const test::Folder folder;
+  std::vector<std::string> files;
+  for (const int begin : {5, 7}) {
+    files.push_back("from " + std::to_string(begin) + ".mcap");
+    DevFile file(folder, files.back());
+    if (begin == 7) file.add("gain");  // the channels have other numbers
+    const auto count = file.add("count");
+    for (const int second : {begin, begin + 1})
+      REQUIRE(file.writer.write(count, {{"value", second}}, rr::TimeSpec{second, 0}, {second, 0}));
+    REQUIRE(file.writer.close());
+  }
+  boost::asio::io_context io(1);
+  std::vector<int> heard;
+  std::optional<Player> player;
+  Player::Listener listener;
+  listener.play = [&](const McapMessage& message, McapTime) {
+    heard.push_back(player->recording().read_document(message).value()["value"].get<int>());
+  };
+  listener.forget = [](std::uint16_t) {};
+  listener.changed = [] {};
+  listener.failed = [](const rr::Error& error) { FAIL_CHECK(error.message); };
+  player.emplace(io, Recording::open(files, {}, folder.path("")).value(), listener);
+  CHECK(player->state().duration == Approx(3));
+  player->step(4);
+  CHECK(heard == std::vector<int>{5, 6, 7, 8});
+  heard.clear();
+  player->seek(1.5);
+  player->step(1);
+  CHECK(heard == std::vector<int>{6, 7});
+  heard.clear();
+  player->seek(2.5);
+  CHECK(heard == std::vector<int>{7});
+  player->seek(0);
+  heard.clear();
+  player->set_loops(true);
+  player->set_speed(1000);
+  player->play();
+  REQUIRE(run_until(io, [&] { return heard.size() >= 6; }));
+  CHECK(std::vector<int>(heard.begin(), heard.begin() + 6) == std::vector<int>{5, 6, 7, 8, 5, 6});
 }
 
 TEST_CASE("before its first value, a wire or property that a replay goes back to has none again") {

@@ -38,14 +38,18 @@ struct Played {
     test::write_recording(folder.path(name_of(number)));
     return name_of(number);
   }
+  static std::string device_of(const std::string& file) { return replay_of(recording_of_file(file)); }
   std::string write_endless(int number) {
     test::write_endless_recording(folder.path(name_of(number)));
     return name_of(number);
   }
   /// What becomes of it; nullopt: nothing yet.
   std::shared_ptr<std::optional<rr::Result<>>> begin(const std::string& file) {
+    return begin(device_of(file), std::vector<std::string>{file});
+  }
+  std::shared_ptr<std::optional<rr::Result<>>> begin(const std::string& device, std::vector<std::string> files) {
     auto out = std::make_shared<std::optional<rr::Result<>>>();
-    boost::asio::co_spawn(io, replays->play(folder.path(""), file),
+    boost::asio::co_spawn(io, replays->play(device, folder.path(""), std::move(files)),
                           [out](const std::exception_ptr&, const rr::Result<>& result) { *out = result; });
     return out;
   }
@@ -73,7 +77,7 @@ TEST_CASE("replays: a file is a shared device of the recorded service and of one
   Played made;
   const auto file = made.write(1);
   REQUIRE(made.play(file));
-  const auto name = replay_of_file(file);
+  const auto name = Played::device_of(file);
   CHECK(name == "replay~arm.Robot.20261121T083000123Z");
   CHECK(recording_of_replay(name) == "arm.Robot.20261121T083000123Z");
   const auto* device = made.devices.find(name);
@@ -149,11 +153,36 @@ TEST_CASE("replays: one whose file has gone, or whose folder is none any more, e
   REQUIRE(made.play(file));
   REQUIRE(made.play(other));
   std::filesystem::remove(made.folder.path(file));
-  CHECK(made.has_gone(replay_of_file(file)));
+  CHECK(made.has_gone(Played::device_of(file)));
   made.replays->keep_folder(made.folder.path(""));
-  CHECK(made.replays->is_playing(replay_of_file(other)));
+  CHECK(made.replays->is_playing(Played::device_of(other)));
   made.replays->keep_folder("/elsewhere");
-  CHECK(made.has_gone(replay_of_file(other)));
+  CHECK(made.has_gone(Played::device_of(other)));
+}
+
+TEST_CASE("replays: several files of a recording are one device, which ends when one of them has gone") {
+  Played made;
+  const auto first = made.write(1);
+  const auto recording = recording_of_file(first);
+  const auto second = recording + "-2.mcap";
+  test::write_recording(made.folder.path(second), 0, 200);
+  const auto outcome = made.begin(replay_of(recording), {first, second});
+  REQUIRE(made.until([&] { return outcome->has_value(); }));
+  REQUIRE(**outcome);
+  for (const auto& each : {first, second}) {
+    const auto alone = made.begin(replay_of_file(each), {each});
+    REQUIRE(made.until([&] { return alone->has_value(); }));
+    REQUIRE(**alone);
+    CHECK(recording_of_replay(replay_of_file(each)) == recording);
+  }
+  CHECK(made.replays->list() ==
+        std::vector<std::string>{"replay~" + recording, "replay~" + recording + "-1", "replay~" + recording + "-2"});
+  std::filesystem::remove(made.folder.path(second));
+  CHECK(made.has_gone(replay_of(recording)));
+  CHECK(made.has_gone(replay_of_file(second)));
+  CHECK(made.replays->is_playing(replay_of_file(first)));
+  made.replays->end_all_of(recording);
+  CHECK(made.replays->list().empty());
 }
 
 TEST_CASE("replays: a file that can't be played says why, and is no device") {
@@ -200,15 +229,15 @@ TEST_CASE("replays: one for which there is no thread is refused, and can be play
 TEST_CASE("replays: one whose file is still read is not played yet, but is one of those that can be ended") {
   Played made;
   const auto file = made.write_endless(1);
-  const auto name = replay_of_file(file);
+  const auto name = Played::device_of(file);
   const auto outcome = made.begin(file);
   REQUIRE(made.until([&] { return made.replays->list() == std::vector<std::string>{name}; }));
   CHECK_FALSE(made.replays->is_playing(name));
   const auto other = made.write(2);
   REQUIRE(made.play(other));
-  CHECK(made.replays->is_playing(replay_of_file(other)));
+  CHECK(made.replays->is_playing(Played::device_of(other)));
   made.replays->end(name);
-  CHECK(made.replays->list() == std::vector<std::string>{replay_of_file(other)});
+  CHECK(made.replays->list() == std::vector<std::string>{Played::device_of(other)});
 }
 
 TEST_CASE("replays: who waits for one to begin hears of its end, and of that of the gateway") {

@@ -13,8 +13,8 @@
 
 namespace rrgate::test {
 
-/// Ten seconds of a wire. `filling`  bytes that each message has besides.
-inline void write_recording(const std::string& path, std::size_t filling = 0) {
+/// Ten seconds of a wire. `filling`  bytes that each message has besides. `begin`  in seconds.
+inline void write_recording(const std::string& path, std::size_t filling = 0, int begin = 100) {
   const std::string definition = "service com.x\nstdver 0.10\nobject Robot\n    wire int32 count [readonly]\nend\n";
   rr::TypeRegistry types;
   REQUIRE(types.add({definition}, rr::RobdefMode::strict).has_value());
@@ -33,7 +33,7 @@ inline void write_recording(const std::string& path, std::size_t filling = 0) {
   message["filling"] = std::string(filling, 'x');
   for (int i = 0; i <= 10; ++i) {
     message["value"] = i;
-    REQUIRE(writer.write(channel, message, rr::TimeSpec{100 + i, 0}, {100 + i, 0}).has_value());
+    REQUIRE(writer.write(channel, message, rr::TimeSpec{begin + i, 0}, {begin + i, 0}).has_value());
   }
   REQUIRE(writer.close().has_value());
 }

@@ -10,8 +10,6 @@ import type { Session } from "./session";
 export interface RecordingFile {
   name: string;
   bytes: number;
-  /** The device that plays it; "": none. */
-  replay: string;
 }
 
 export interface Recording {
@@ -28,6 +26,8 @@ export interface Recording {
   seconds: number;
   bytes: number;
   files: readonly RecordingFile[];
+  /** The device that plays it, or one of its files; "": none. */
+  replay: string;
 }
 
 export interface Recordings {
@@ -100,12 +100,12 @@ export class RecordingDesk {
     return this.#send(`${PATH}/${encodeURIComponent(recording.name)}`, "DELETE");
   }
 
-  play(file: RecordingFile): Promise<void> {
-    return this.#send(`${fileAddress(file)}/play`, "POST", {});
+  play(recording: Recording): Promise<void> {
+    return this.#send(`${PATH}/${encodeURIComponent(recording.name)}/play`, "POST", {});
   }
 
-  endPlaying(file: RecordingFile): Promise<void> {
-    return this.#send(`${fileAddress(file)}/play`, "DELETE");
+  endPlaying(recording: Recording): Promise<void> {
+    return this.#send(`${PATH}/${encodeURIComponent(recording.name)}/play`, "DELETE");
   }
 
   async #ask(signal: AbortSignal): Promise<Recordings> {
@@ -147,11 +147,8 @@ export function readRecordings(answer: unknown): Recordings {
       beginMs: number(each["begin"]) * 1000,
       seconds: number(each["seconds"]),
       bytes: number(each["bytes"]),
-      files: list(each["files"]).map((file) => ({
-        name: text(file["name"]),
-        bytes: number(file["bytes"]),
-        replay: text(file["replay"]),
-      })),
+      files: list(each["files"]).map((file) => ({ name: text(file["name"]), bytes: number(file["bytes"]) })),
+      replay: [each, ...list(each["files"])].map(({ replay }) => text(replay)).find((device) => device !== "") ?? "",
     })),
   };
 }

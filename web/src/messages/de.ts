@@ -516,11 +516,8 @@ const german: Readonly<Record<string, string>> = {
   Download: "Herunterladen",
   "Download part {0}": "Teil {0} herunterladen",
   "Stop recording": "Aufzeichnung beenden",
-  "Play part {0}": "Teil {0} abspielen",
   "Stop playing": "Abspielen beenden",
-  "Stop playing part {0}": "Abspielen von Teil {0} beenden",
   "Show the recording": "Aufzeichnung zeigen",
-  "Show part {0}": "Teil {0} zeigen",
   "{0} recordings are played already; stop one of them first":
     "{0} Aufzeichnungen werden schon abgespielt; beenden Sie zuerst eine",
   "Plays a recording: these are not the values of now":

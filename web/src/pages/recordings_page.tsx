@@ -8,7 +8,7 @@ import { useStore } from "../app/store";
 import { devicesOf, isReplay } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { fileAddress, isUnderWay, MOST_REPLAYS, RecordingDesk } from "../gateway/recordings";
-import type { Recording, RecordingFile } from "../gateway/recordings";
+import type { Recording } from "../gateway/recordings";
 import { session } from "../gateway/session";
 import { isUsb } from "../gateway/usb_devices";
 import { Failure } from "../ui/failure";
@@ -28,7 +28,7 @@ export default function Recordings({ list }: RecordingsProps) {
 export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
   const state = useStore(desk.state);
   const trouble = useStore(desk.trouble);
-  const playing = state?.list.flatMap(({ files }) => files).filter(({ replay }) => replay !== "").length ?? 0;
+  const playing = state?.list.filter(({ replay }) => replay !== "").length ?? 0;
   const mayPlay = playing < MOST_REPLAYS;
   useEffect(() => {
     desk.start();
@@ -145,16 +145,7 @@ function RecordingRow({ recording, desk, mayPlay }: RecordingRowProps) {
             {files.length === 1 ? t("Download") : t("Download part {0}", index + 1)}
           </a>
         ))}
-        {files.map((file, index) => (
-          <PlayButtons
-            key={file.name}
-            file={file}
-            part={files.length === 1 ? null : index + 1}
-            service={service}
-            desk={desk}
-            mayPlay={mayPlay}
-          />
-        ))}
+        {files.length > 0 && <PlayButtons recording={recording} desk={desk} mayPlay={mayPlay} />}
         {isUnderWay(recording) && !standing && (
           <button class="button" type="button" onClick={() => void desk.end(recording)}>
             {t("Stop recording")}
@@ -183,23 +174,15 @@ function RecordingRow({ recording, desk, mayPlay }: RecordingRowProps) {
   );
 }
 
-interface PlayButtonsProps {
-  file: RecordingFile;
-  /** null: there is one only. */
-  part: number | null;
-  service: string;
-  desk: RecordingDesk;
-  mayPlay: boolean;
-}
-
-function PlayButtons({ file, part, service, desk, mayPlay }: PlayButtonsProps) {
+function PlayButtons({ recording, desk, mayPlay }: RecordingRowProps) {
+  const { replay, service } = recording;
   const [isBeginning, setBeginning] = useState(false);
   const play = async (): Promise<void> => {
     setBeginning(true);
-    await desk.play(file);
+    await desk.play(recording);
     setBeginning(false);
   };
-  if (file.replay === "")
+  if (replay === "")
     return (
       <button
         class="button"
@@ -208,16 +191,16 @@ function PlayButtons({ file, part, service, desk, mayPlay }: PlayButtonsProps) {
         title={mayPlay ? undefined : t("{0} recordings are played already; stop one of them first", MOST_REPLAYS)}
         onClick={() => void play()}
       >
-        {part === null ? t("Play") : t("Play part {0}", part)}
+        {t("Play")}
       </button>
     );
   return (
     <>
-      <a class="button" href={formatRoute(file.replay, service)}>
-        {part === null ? t("Show the recording") : t("Show part {0}", part)}
+      <a class="button" href={formatRoute(replay, service)}>
+        {t("Show the recording")}
       </a>
-      <button class="button" type="button" onClick={() => void desk.endPlaying(file)}>
-        {part === null ? t("Stop playing") : t("Stop playing part {0}", part)}
+      <button class="button" type="button" onClick={() => void desk.endPlaying(recording)}>
+        {t("Stop playing")}
       </button>
     </>
   );
