@@ -43,7 +43,7 @@ void ClientSession::reply_callback(CallbackId id, const Result<Value>& result, N
   if (sent) return;
   // What cannot be sent becomes an error, so that the service does not wait in vain.
   begin();
-  write_error(outgoing_, sent.error());
+  write_error(outgoing_, sent.error(), types_);
   if (auto second = send_outgoing(now); !second) fail(second.error());
 }
 

@@ -86,6 +86,16 @@ TEST_CASE("the client's error reaches the service, and so does an answer that do
   CHECK(error.message == "joint 3");
   id = pair.ask();
   pair.pump();
+  Error jammed{ErrorCode::remote_error, "joint 3", "experimental.loopback.ArmJammed"};
+  const Structure pose{"experimental.loopback.Pose",
+                       {{"x", Value(1.0)}, {"joints", Value(Array::take(std::vector<double>{2.0}))}}};
+  jammed.param = std::make_shared<const Value>(pose);
+  pair.client->reply_callback(pair.next_client<CallbackCalled>().id, jammed, pair.now);
+  const auto told = pair.answer_to(id).error().param;
+  REQUIRE(told);
+  CHECK(*told == Value(pose));
+  id = pair.ask();
+  pair.pump();
   pair.client->reply_callback(pair.next_client<CallbackCalled>().id, Value("much"), pair.now);
   CHECK(pair.answer_to(id).error().code == ErrorCode::data_type_mismatch);
 }
