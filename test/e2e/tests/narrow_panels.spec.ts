@@ -90,3 +90,18 @@ test("panels of a robot", async ({ browser }) => {
     await robot.stop();
   }
 });
+
+test("a robot's joints fit into its panel, however narrow", async ({ page }) => {
+  const robot = await startPeer("test/interop/peers/standard_robot.py", "robot");
+  try {
+    await page.goto(`${robot.url}#/devices/peer/robot?view=board&board=${boardOf({ robot: {} })}`);
+    await expect(page.getByRole("button", { name: "joint_1 forward" })).toBeVisible();
+    const scroll = page.locator(".robot-panel");
+    for (const width of [900, 1100, 1300, 1500, 1700, 1900]) {
+      await page.setViewportSize({ width, height: 1000 });
+      expect(await scroll.evaluate((each) => each.scrollWidth - each.clientWidth), `page of ${width} px`).toBe(0);
+    }
+  } finally {
+    await robot.stop();
+  }
+});
