@@ -84,7 +84,8 @@ struct Recorded {
   rr::Result<> begun = {};
 };
 
-Recorded record(const test::Folder& folder, const std::vector<std::string>& members) {
+/// `messages`  that there are of each value at least.
+Recorded record(const test::Folder& folder, const std::vector<std::string>& members, std::uint64_t messages) {
   Device device;
   boost::asio::io_context io(1);
   auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
@@ -104,10 +105,10 @@ Recorded record(const test::Folder& folder, const std::vector<std::string>& memb
   for (std::int32_t i = 1; out.begun && i <= values; ++i) {
     const auto before = writer.message_count();
     device.tell(i);
-    run_until(io, [&] { return writer.message_count() > before + 10; });  // four, and readings of the property
+    REQUIRE(run_until(io, [&] { return writer.message_count() >= before + messages; }));
   }
   recorder->close();
-  run_until(io, [] { return false; });
+  REQUIRE(run_until(io, [&] { return io.stopped(); }));
   REQUIRE(writer.close());
   return out;
 }
@@ -185,7 +186,7 @@ std::vector<Stamped> recorded_values(const std::string& path, const std::string&
 
 TEST_CASE("what was recorded is replayed: the same values, in their order, with their time stamps") {
   const test::Folder folder;
-  const auto recorded = record(folder, {"*", "axes/x%20y/*"});
+  const auto recorded = record(folder, {"*", "axes/x%20y/*"}, 11);  // four, and readings of the property
   CHECK(recorded.problems.empty());
   const auto counts = recorded_values(recorded.path, "/Dev/count");
   const auto angles = recorded_values(recorded.path, "/Dev/axes/x y/angle");
@@ -229,7 +230,7 @@ TEST_CASE("what was recorded is replayed: the same values, in their order, with 
 
 TEST_CASE("members that were not recorded say that this is a replay") {
   const test::Folder folder;
-  const auto recorded = record(folder, {"count", "gain"});
+  const auto recorded = record(folder, {"count", "gain"}, 11);
   const RunningReplay replay(recorded.path);
   auto dev = rr::connect(replay.url());
   const auto refusal = [&](const auto& ask) {
@@ -248,7 +249,7 @@ TEST_CASE("members that were not recorded say that this is a replay") {
 
 TEST_CASE("a replay is moved, stepped, sped up and played again, and time stamps go on") {
   const test::Folder folder;
-  const auto recorded = record(folder, {"count"});
+  const auto recorded = record(folder, {"count"}, 1);
   const auto counts = recorded_values(recorded.path, "/Dev/count");
   const RunningReplay replay(recorded.path);
   auto dev = rr::connect(replay.url());
@@ -506,7 +507,7 @@ TEST_CASE("an object that is first there after a reconnection is recorded from t
   device = std::make_unique<Device>(port);
   REQUIRE(records(writer.message_count() + 10, 2));
   recorder->close();
-  run_until(io, [] { return false; });
+  REQUIRE(run_until(io, [&] { return io.stopped(); }));
   REQUIRE(writer.close());
   CHECK(!recorded_values(writer.path(), "/Dev/axes/x y/angle").empty());
   const auto recording = Recording::open(writer.path()).value();
@@ -518,13 +519,13 @@ TEST_CASE("an object that is first there after a reconnection is recorded from t
 
 TEST_CASE("what can't be recorded is told, and the rest recorded") {
   const test::Folder folder;
-  const auto some = record(folder, {"count", "nonesuch", "axes/y/angle", "go"});
+  const auto some = record(folder, {"count", "nonesuch", "axes/y/angle", "go"}, 1);
   REQUIRE(some.begun);
   REQUIRE(some.problems.size() == 3);
   CHECK_THAT(some.problems[0], Catch::Contains("'nonesuch': no member to record; com.dev.Dev has: count, words, said"));
   CHECK_THAT(some.problems[1], Catch::Contains("'axes/y/angle': "));
   const test::Folder other;
-  const auto none = record(other, {"axes/x"});
+  const auto none = record(other, {"axes/x"}, 0);
   REQUIRE(!none.begun);
   CHECK_THAT(none.begun.error().message, Catch::Contains("'axes/x': objref 'axes' needs an index"));
 }
