@@ -58,6 +58,24 @@ class Dev(unittest.TestCase):
         for word in ("0", "1h", "fuzz_nothing", "--quik", "coverage"):
             self.check_refused(f'fuzz: unknown word "{word}"; expected --quick, minutes, or a target as fuzz_json', "fuzz", word)
 
+    def test_fuzzers_run_side_by_side_and_one_that_finds_something_ends_no_other(self):
+        targets = self.folder / "build/fuzz/test/fuzz"
+        targets.mkdir(parents=True)
+        shutil.copy(ROOT / "dev", self.folder)
+        there, back = self.folder / "there", self.folder / "back"  # a waits for b, and b for a
+        os.mkfifo(there)
+        os.mkfifo(back)
+        for name, text in {"a": f"echo >{there}; read _ <{back}", "c": "exit 0",
+                           "b": f"read _ <{there}; echo >{back}; echo 'ERROR: found'; exit 77"}.items():
+            self.put(targets.relative_to(self.folder) / f"fuzz_{name}", text)
+        self.put("python3", '[ "$2" != --write ] || cat >"$3"')
+        script = (f"set -- help; source {self.folder}/dev >/dev/null; build_preset() {{ :; }}; junit=$HOME/junit; jobs=2; "
+                  "fuzz --quick || echo ended with $?")
+        done = self.run_script("bash", "-c", script)
+        results = "fuzz_a passed\nfuzz_b failed\nfuzz_c passed\n"
+        self.assertTrue(done.stdout.endswith(f"\nERROR: found\n{results}ended with 1\n"), done.stdout + done.stderr)
+        self.assertEqual((self.folder / "junit").read_text(), results)
+
     def test_what_can_be_simulated_is_listed_before_anything_is_built(self):
         done = self.run_script("./dev", "demo", "--list")
         self.assertEqual(done.returncode, 0)
