@@ -3,7 +3,7 @@ import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import { startTestService, webRoot } from "../processes";
 import type { Lab } from "../processes";
-import { addPanel } from "../board";
+import { addPanel, arrange } from "../board";
 
 const pad = (page: Page) => page.locator(".teleop-pad");
 const command = (page: Page) => page.locator('[data-teleop="command"]');
@@ -22,12 +22,30 @@ const pushGamepad = (page: Page, up: number, mapping = "standard") =>
     [up, mapping] as const,
   );
 
+/** Forward, by the left stick, 50 mm/s at most. */
+const settings = {
+  member: "Drive",
+  axes: [{ stick: "left-y", path: "velocity", scale: 50, deadZone: 0.1 }],
+  neutral: { velocity: "0", radius: "32767" },
+};
+
 test.beforeEach(async ({ page, lab }) => {
   await page.addInitScript(() => {
     Object.assign(window, { pads: [] });
     navigator.getGamepads = () => (window as unknown as { pads: Gamepad[] }).pads;
   });
-  await page.goto(`${lab.url}#/devices/create/Create?view=board`);
+  const board = { board: 1, panels: [{ kind: "teleop", x: 0, y: 0, w: 6, h: 12, settings }] };
+  const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
+  await page.goto(`${lab.url}#/devices/create/Create?view=board&board=${packed}`);
+  await arrange(page);
+  await expect(command(page)).toHaveText("0,32767");
+});
+
+test("what an axis sets, by how much, and what is sent at rest are typed in; a key drives by them", async ({
+  page,
+  lab,
+}) => {
+  await page.getByRole("button", { name: "Remove Drive" }).click();
   await addPanel(page, "teleop");
   const panel = page.locator('[data-panel="teleop"]');
   await panel.getByLabel("Member").selectOption("Drive");
@@ -51,6 +69,11 @@ test.beforeEach(async ({ page, lab }) => {
   await panel.getByLabel("radius at rest").fill("32767");
   await panel.getByLabel("radius at rest").blur();
   await expect(command(page)).toHaveText("0,32767");
+  await pad(page).focus();
+  await page.keyboard.down("KeyW");
+  await expectSpeed(lab, 0.05);
+  await page.keyboard.up("KeyW");
+  await expectSpeed(lab, 0);
 });
 
 test("a key drives while it is held, and letting go stops at once", async ({ page, lab }) => {
