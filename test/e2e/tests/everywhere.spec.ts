@@ -10,107 +10,105 @@ import { repositoryRoot, startTestService, webRoot } from "../processes";
 
 const axe = readFileSync(path.join(repositoryRoot, "web/node_modules/axe-core/axe.min.js"), "utf8");
 
+/** In both colour schemes. */
 async function violations(page: Page): Promise<string[]> {
   await page.evaluate(axe); // past the page's policy, as a debugger
-  return page.evaluate(async () => {
-    const { violations: found } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
-    return found.map(
-      (each: any) =>
-        `${each.id}: ${each.nodes
-          .map((node: any) => node.html)
-          .join(" ")
-          .slice(0, 400)}`,
-    );
-  });
-}
-
-for (const colorScheme of ["light", "dark"] as const) {
-  for (const [size, viewport] of Object.entries({
-    desk: { width: 1280, height: 800 },
-    phone: { width: 412, height: 839 },
-  })) {
-    test(`no page has a barrier that axe finds: ${colorScheme}, ${size}`, async ({ page, lab }) => {
-      await page.setViewportSize(viewport);
-      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
-      for (const address of [
-        "#/",
-        "#/devices/create/Create",
-        "#/devices/create/Create?view=board",
-        "#/devices/create/Create?view=members",
-      ]) {
-        await page.goto(`${lab.url}${address}`);
-        await expect(page.locator('[data-state="online"]').first()).toBeVisible();
-        if (address.endsWith("board")) {
-          await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
-          await page.getByRole("button", { name: "Arrange" }).click();
-        }
-        expect(await violations(page), address).toEqual([]);
-        const tooWide = await page.evaluate(
-          () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
-        );
-        expect(tooWide, address).toBeLessThanOrEqual(0);
-      }
+  const all: string[] = [];
+  for (const colorScheme of ["light", "dark"] as const) {
+    await page.emulateMedia({ colorScheme });
+    const found = await page.evaluate(async () => {
+      const { violations } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
+      return violations.map(
+        (each: any) =>
+          `${each.id}: ${each.nodes
+            .map((node: any) => node.html)
+            .join(" ")
+            .slice(0, 400)}`,
+      ) as string[];
     });
+    all.push(...found.map((each) => `${colorScheme}: ${each}`));
   }
+  return all;
 }
 
-for (const colorScheme of ["light", "dark"] as const) {
-  test(`no panel has a barrier that axe finds, whatever its kind: ${colorScheme}`, async ({ page }) => {
-    test.slow(); // a page for each kind
-    const all = await startTestService(webRoot, (url) => ({ devices: [{ name: "big", url }] }));
-    const robot = await startPeer("test/interop/peers/standard_robot.py", "robot");
-    try {
-      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
-      for (const kind of PANEL_KINDS) {
-        const place = ["robot", "trajectory"].includes(kind)
-          ? `${robot.url}#/devices/peer/robot`
-          : `${all.url}#/devices/big/interop`;
-        const board = { board: 1, panels: [{ kind, x: 0, y: 0, w: 6, h: 12 }] };
-        const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
-        await page.goto(`${place}?view=board&board=${packed}`);
-        await page.reload();
-        await expect(page.locator('[data-link="online"]')).toBeVisible();
-        const content = page.locator(`[data-panel="${kind}"] .panel-body > :is(div, textarea)`);
-        await expect(content.first()).toBeVisible();
-        expect(await violations(page), kind).toEqual([]);
+for (const [size, viewport] of Object.entries({
+  desk: { width: 1280, height: 800 },
+  phone: { width: 412, height: 839 },
+})) {
+  test(`no page has a barrier that axe finds: ${size}`, async ({ page, lab }) => {
+    await page.setViewportSize(viewport);
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    for (const address of [
+      "#/",
+      "#/devices/create/Create",
+      "#/devices/create/Create?view=board",
+      "#/devices/create/Create?view=members",
+    ]) {
+      await page.goto(`${lab.url}${address}`);
+      await expect(page.locator('[data-state="online"]').first()).toBeVisible();
+      if (address.endsWith("board")) {
+        await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
         await page.getByRole("button", { name: "Arrange" }).click();
-        await page.getByRole("button", { name: /^Remove / }).click();
-        await expect(page.getByRole("button", { name: "Undo" })).toBeVisible();
-        expect(await violations(page), `${kind}, removed`).toEqual([]);
       }
-    } finally {
-      await Promise.all([all.stop(), robot.stop()]);
+      expect(await violations(page), address).toEqual([]);
+      const tooWide = await page.evaluate(
+        () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      );
+      expect(tooWide, address).toBeLessThanOrEqual(0);
     }
   });
 }
 
+test("no panel has a barrier that axe finds, whatever its kind", async ({ page }) => {
+  test.slow(); // a page for each kind
+  const all = await startTestService(webRoot, (url) => ({ devices: [{ name: "big", url }] }));
+  const robot = await startPeer("test/interop/peers/standard_robot.py", "robot");
+  try {
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    for (const kind of PANEL_KINDS) {
+      const place = ["robot", "trajectory"].includes(kind)
+        ? `${robot.url}#/devices/peer/robot`
+        : `${all.url}#/devices/big/interop`;
+      const board = { board: 1, panels: [{ kind, x: 0, y: 0, w: 6, h: 12 }] };
+      const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
+      await page.goto(`${place}?view=board&board=${packed}`);
+      await page.reload();
+      await expect(page.locator('[data-link="online"]')).toBeVisible();
+      const content = page.locator(`[data-panel="${kind}"] .panel-body > :is(div, textarea)`);
+      await expect(content.first()).toBeVisible();
+      expect(await violations(page), kind).toEqual([]);
+      await page.getByRole("button", { name: "Arrange" }).click();
+      await page.getByRole("button", { name: /^Remove / }).click();
+      await expect(page.getByRole("button", { name: "Undo" })).toBeVisible();
+      expect(await violations(page), `${kind}, removed`).toEqual([]);
+    }
+  } finally {
+    await Promise.all([all.stop(), robot.stop()]);
+  }
+});
+
 test("neither the sign-in, the account, a list without devices nor the offline page has a barrier that axe finds", async ({
   page,
-  context,
 }) => {
   const guarded = await GuardedLab.start(webRoot);
   try {
     await page.route("**/api/v1/devices", (route) => route.fulfill({ json: { devices: [] } }));
-    for (const colorScheme of ["light", "dark"] as const) {
-      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
-      await context.clearCookies();
-      await page.goto(guarded.url);
-      await page.reload();
-      await expect(page.getByRole("form", { name: "Sign in" })).toBeVisible();
-      expect(await violations(page), "sign-in").toEqual([]);
-      await page.getByLabel("Name").fill("root");
-      await page.getByLabel("Password or token").fill(password);
-      await page.keyboard.press("Enter");
-      await expect(page.getByRole("group", { name: "You" })).toContainText("root admin");
-      await expect(page.locator(".empty").first()).toBeVisible();
-      expect(await violations(page), "no devices, signed in").toEqual([]);
-      await page.goto(`${guarded.url}#/recordings`);
-      await expect(page.getByRole("heading", { name: "Recordings" })).toBeVisible();
-      expect(await violations(page), "recordings").toEqual([]);
-      await page.goto(`${guarded.url}offline.html`);
-      await expect(page.getByRole("heading", { name: "The gateway cannot be reached" })).toBeVisible();
-      expect(await violations(page), "offline").toEqual([]);
-    }
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await page.goto(guarded.url);
+    await expect(page.getByRole("form", { name: "Sign in" })).toBeVisible();
+    expect(await violations(page), "sign-in").toEqual([]);
+    await page.getByLabel("Name").fill("root");
+    await page.getByLabel("Password or token").fill(password);
+    await page.keyboard.press("Enter");
+    await expect(page.getByRole("group", { name: "You" })).toContainText("root admin");
+    await expect(page.locator(".empty").first()).toBeVisible();
+    expect(await violations(page), "no devices, signed in").toEqual([]);
+    await page.goto(`${guarded.url}#/recordings`);
+    await expect(page.getByRole("heading", { name: "Recordings" })).toBeVisible();
+    expect(await violations(page), "recordings").toEqual([]);
+    await page.goto(`${guarded.url}offline.html`);
+    await expect(page.getByRole("heading", { name: "The gateway cannot be reached" })).toBeVisible();
+    expect(await violations(page), "offline").toEqual([]);
   } finally {
     await guarded.stop();
   }
