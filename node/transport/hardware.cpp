@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
@@ -101,23 +103,26 @@ struct HardwareWatch::State {
   OnProblem on_problem;
   DriverRoots roots;
   WatchTimer timer;
+  asio::cancellation_signal stop_looking = {};
   std::optional<asio::posix::stream_descriptor> news = {};
   std::vector<std::string> problems = {};  ///< of the look before
 };
 
 HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_nodes, OnProblem on_problem,
                              std::chrono::milliseconds refresh, DriverRoots roots)
-    : state_(std::make_shared<State>(State{std::move(on_nodes), std::move(on_problem), std::move(roots),
-                                           WatchTimer(executor, refresh, settle_time)})) {
+    : state_(new State{std::move(on_nodes), std::move(on_problem), std::move(roots),
+                       WatchTimer(executor, refresh, settle_time)}) {
   if (const int number = open_news(); number >= 0) {
     state_->news.emplace(executor, number);
     asio::co_spawn(executor, listen(state_), asio::detached);
   }
-  asio::co_spawn(executor, run(state_), asio::detached);
+  asio::co_spawn(executor, run(state_),
+                 asio::bind_cancellation_slot(state_->stop_looking.slot(), [state = state_](std::exception_ptr) {}));
 }
 
 HardwareWatch::~HardwareWatch() {
   state_->timer.stop();
+  state_->stop_looking.emit(asio::cancellation_type::terminal);
   error_code ignored;
   if (state_->news) state_->news->close(ignored);
 }

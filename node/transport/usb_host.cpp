@@ -123,7 +123,10 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
       arrived->cancel();
     });
     if (!answer->is_there) co_await arrived->async_wait(await_tuple);
-    if (!answer->is_there) co_return;  // cancelled: it is asked again
+    if (!answer->is_there) {  // cancelled: it is asked again
+      opened.handle->cancel();
+      co_return;
+    }
     // A refusal says what the device is; anything else is worth another try.
     if (answer->status != UsbStatus::ok && answer->status != UsbStatus::stall) {
       known->problem = open_problem(known->device, answer->status);
@@ -147,25 +150,31 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
 }
 
 awaitable<UsbHost::Found> UsbHost::scan() {
-  if (is_scanning_) {
-    // One that runs already will do: what is plugged in during it shows in the next.
-    while (is_scanning_) co_await scanned_->async_wait(await_tuple);
-  } else {
+  bool has_looked = false;
+  while (is_scanning_) {  // one that runs already will do: what is plugged in during it shows in the next
+    co_await scanned_->async_wait(await_tuple);
+    has_looked = !was_cut_short_;
+  }
+  if (!has_looked) {
     struct Scanning {  // others wait for its end, also where it is cancelled
       UsbHost& host;
+      bool is_whole = false;
       ~Scanning() {
         host.is_scanning_ = false;
+        host.was_cut_short_ = !is_whole;
         if (host.scanned_) host.scanned_->cancel();
       }
     };
     is_scanning_ = true;
-    const Scanning scanning{*this};
+    Scanning scanning{*this};
     const auto looked = look();
     problem_ = looked ? "" : looked.error().message;
     std::vector<std::shared_ptr<Known>> to_ask;
     for (const auto& [place, known] : known_)
       if (!known->probed && known->claim.expired()) to_ask.push_back(known);
     for (const auto& known : to_ask) co_await probe(known);
+    const auto state = co_await asio::this_coro::cancellation_state;
+    scanning.is_whole = state.cancelled() == asio::cancellation_type::none;
   }
   Found found;
   if (!problem_.empty()) found.problems.push_back(problem_);

@@ -65,6 +65,7 @@ class UsbHost final : public boost::asio::execution_context::service {
   std::vector<std::weak_ptr<UsbContext>> contexts_;
   std::string problem_;  ///< libusb itself does not work
   bool is_scanning_ = false;
+  bool was_cut_short_ = false;                        ///< the last scan was cancelled
   std::optional<boost::asio::steady_timer> scanned_;  ///< cancelled at the end of a scan
 };
 

@@ -1,9 +1,12 @@
 // What the host sees of USB before any transfer, with the real libusb and udev library on a simulated /sys and /dev
 // (umockdev-wrapper): enumeration, what is worth asking, hot-plug.
+#include <dlfcn.h>
+#include <libusb-1.0/libusb.h>
 #include <umockdev.h>
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <catch2/catch.hpp>
 #include <memory>
@@ -71,7 +74,53 @@ UsbHost::Found scan(asio::io_context& io) {
   return found;
 }
 
+/// Devices take requests and never answer, until one of them is cancelled.
+class Silence {
+ public:
+  explicit Silence(asio::io_context& io) : io_(io) { current = this; }
+  ~Silence() { current = nullptr; }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+  int take(libusb_transfer* transfer) {
+    pending_ = transfer;
+    return 0;
+  }
+  int cancel() {
+    current = nullptr;
+    asio::post(io_, [this] {
+      auto* cancelled = std::exchange(pending_, nullptr);
+      cancelled->status = LIBUSB_TRANSFER_CANCELLED;
+      cancelled->callback(cancelled);
+    });
+    return 0;
+  }
+  bool has_pending() const { return pending_ != nullptr; }
+
+  static Silence* current;
+
+ private:
+  asio::io_context& io_;
+  libusb_transfer* pending_ = nullptr;
+};
+Silence* Silence::current = nullptr;
+
+using OnTransfer = int (*)(libusb_transfer*);
+OnTransfer next_of(const char* name) {
+  return reinterpret_cast<OnTransfer>(dlsym(RTLD_NEXT, name));
+}
+
 }  // namespace
+
+// Instead of those of libusb, which they call.
+
+int LIBUSB_CALL libusb_submit_transfer(libusb_transfer* transfer) {
+  return Silence::current ? Silence::current->take(transfer) : next_of(__func__)(transfer);
+}
+
+int LIBUSB_CALL libusb_cancel_transfer(libusb_transfer* transfer) {
+  return Silence::current ? Silence::current->cancel() : next_of(__func__)(transfer);
+}
 
 TEST_CASE("devices are enumerated with their interfaces, endpoints and places") {
   Machine machine;
@@ -162,6 +211,28 @@ TEST_CASE("a watch tells once why a device can't be used, and again when it is p
   path = machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
   look_again();
   CHECK(problems.size() == 2);
+}
+
+TEST_CASE("a watch that ends waits for no device that does not answer, and who waits for its look looks again") {
+  Machine machine;
+  machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
+  asio::io_context io{1};
+  const Silence silence(io);
+  std::optional<HardwareWatch> watch;
+  watch.emplace(
+      io.get_executor(), [](const auto&) {}, [](const std::string& problem) { FAIL_CHECK(problem); }, 60s);
+  for (int handlers = 0; !silence.has_pending() && handlers < 1000; ++handlers) io.run_one_for(5s);
+  REQUIRE(silence.has_pending());
+  std::optional<UsbHost::Found> found;
+  asio::co_spawn(
+      io, [&]() -> awaitable<void> { found = co_await UsbHost::of(io.get_executor()).scan(); },
+      [](std::exception_ptr) {});
+  asio::post(io, [&] { watch.reset(); });
+  io.run_for(5s);
+  CHECK(io.stopped());  // nothing is left to do
+  CHECK_FALSE(silence.has_pending());
+  REQUIRE(found);
+  CHECK(found->problems.size() == 1);  // as this one was asked and has answered
 }
 
 TEST_CASE("discovery reports a device that can't be used") {
