@@ -1,8 +1,5 @@
 // What agents command: found, judged, shown to a person, judged again, given under a lease. Layer: server/mcp. See
 // docs/mcp.md.
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 
 #include "core/types/value_size.hpp"
@@ -24,8 +21,6 @@ constexpr std::size_t largest_results = 1024u * 1024;  // bytes of values; as JS
 
 /// What a device may take to answer; it is the lease that bounds it.
 constexpr std::chrono::seconds longest_call{50};
-/// What a stop may take until it is answered as sent.
-constexpr std::chrono::seconds longest_stop{2};
 /// What a sign of life may take: while one is written, nobody looks whether the lease has to end.
 constexpr milliseconds longest_sign{500};
 /// The gateway holds the lease for the agent as long as its request is there; both parts of it take less.
@@ -50,10 +45,16 @@ class AgentLease {
   }
   AgentLease(const AgentLease&) = delete;
   AgentLease& operator=(const AgentLease&) = delete;
-  ~AgentLease() {
-    holder_->on_lease_ended(nullptr);
-    const auto command = wanted_lease(rr::LockCommand::release_lease, path_);
-    holder_->upstream()->lock(*holder_, command, [](const rr::Result<>&) {});
+  ~AgentLease() { release(); }
+
+  /// Ends it now. What the device answers to that; null: it is not known.
+  SafeAnswerPtr release() {
+    if (!std::exchange(is_released_, true)) {
+      holder_->on_lease_ended(nullptr);
+      const auto command = wanted_lease(rr::LockCommand::release_lease, path_);
+      holder_->upstream()->lock(*holder_, command, [](const rr::Result<>&) {});
+    }
+    return holder_->safe_answer();
   }
 
   /// Throws   rr::Exception: it was taken over, or the device is away.
@@ -71,14 +72,13 @@ class AgentLease {
   std::shared_ptr<ValueClient> holder_;
   std::string path_;
   std::shared_ptr<std::string> lost_;  ///< why; empty: it is held
+  bool is_released_ = false;
 };
 
-/// A stop that the device has not answered, and for how long that is waited for.
-struct OpenStop {
-  explicit OpenStop(const boost::asio::any_io_executor& executor) : end(executor, longest_stop) {}
-
-  std::optional<rr::Result<>> result;
-  boost::asio::steady_timer end;
+/// A command that is being given.
+struct Running {
+  bool is_stopped = false;
+  std::optional<AgentLease> lease;
 };
 
 std::string why_of(const JsonRequest& arguments) {
@@ -256,13 +256,14 @@ rr::awaitable<void> McpTools::ask_person(const Command& command) {
 McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms) {
   const auto& target = *command.target;
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
-  const auto stopped = std::make_shared<bool>(false);
-  const auto watching = gateway_.approvals().watch_stop([stopped, wake = reply_.waker()] {
-    *stopped = true;
+  const auto running = std::make_shared<Running>();
+  const auto watching = gateway_.approvals().watch_stop([running, wake = reply_.waker()] {
+    running->is_stopped = true;
     wake();
+    return running->lease ? running->lease->release() : nullptr;
   });
   auto client = target.client;
-  std::optional<AgentLease> lease;
+  auto& lease = running->lease;
   if (terms.needs_lease) {
     reply_.writer().set_patience(longest_sign);
     auto asker = target.client;
@@ -276,7 +277,7 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
     lease.emplace(client, target.path(), reply_.waker());
   }
   const std::function<void()> check = [&] {
-    if (*stopped) refuse(rr::ErrorCode::operation_aborted, "a person has stopped all agents");
+    if (running->is_stopped) refuse(rr::ErrorCode::operation_aborted, "a person has stopped all agents");
     reply_.expect_client();
     go_on(target, command.wanted.verb);
     if (lease) lease->check();
@@ -312,8 +313,14 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
     };
     reply_.note("the lease is held");
     co_await reply_.wait(terms.hold, is_over);
-    lease.reset();
-    rr::add_key(out, "made_safe") = "the lease was held for " + std::to_string(terms.hold.count()) + " s";
+    const auto safe = lease->release();
+    const auto answer = co_await wait_for_answer(safe);
+    if (!answer)
+      rr::add_key(out, "unanswered") = unanswered_stop;
+    else if (!*answer)
+      rr::add_key(out, "not_made_safe") = error_for_agent(answer->error());
+    else
+      rr::add_key(out, "made_safe") = "the lease was held for " + std::to_string(terms.hold.count()) + " s";
   }
   if (target.member->is_generator() || command.wanted.verb != Verb::call) co_return out;
   // The device has done it: that there is no room for what it says of that is no failure, nor a reason to let go.
@@ -415,22 +422,23 @@ McpTools::Answer McpTools::stop(JsonRequestPtr arguments) {
   const auto target = co_await find(arguments, true);
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
   const auto entry = gateway_.access().begin(who(), access_request(*target, Verb::call), trace, "stop");
-  const auto stop = std::make_shared<OpenStop>(reply_.writer().executor());
-  target->client->upstream()->stop_object(target->path(), [stop, entry](const rr::Result<>& result) {
+  const auto& upstream = target->client->upstream();
+  const auto safe =
+      std::make_shared<SafeAnswer>(reply_.writer().executor(), upstream->device().config().name, target->path());
+  upstream->stop_object(target->path(), [safe, entry](const rr::Result<>& result) {
     if (entry) entry->finish(result);
-    stop->result = result;
-    stop->end.cancel();
+    safe->set(result);
   });
-  if (!stop->result) {
-    has_asked_device_ = true;
-    (void)co_await stop->end.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
-  }
-  const auto& result = stop->result;
-  if (result && !*result) throw rr::Exception(result->error());
-  auto out = rr::OrderedJson::object();
-  rr::add_key(out, result ? "stopped" : "sent") = target->path();
-  if (!result) rr::add_key(out, "unanswered") = "the device has not answered yet: whether it is safe is not known";
-  co_return out;
+  const auto answer = co_await wait_for_answer(safe);
+  if (answer && !*answer) throw rr::Exception(answer->error());
+  co_return stop_to_json(*safe);
+}
+
+rr::awaitable<std::optional<rr::Result<>>> McpTools::wait_for_answer(SafeAnswerPtr safe) {
+  if (!safe) co_return std::nullopt;
+  if (!safe->result()) has_asked_device_ = true;
+  co_await safe->wait();
+  co_return safe->result();
 }
 
 }  // namespace rrgate

@@ -122,6 +122,8 @@ class McpTools {
   rr::awaitable<std::optional<rr::Result<rr::Value>>> ask(ValueClient& client, rr::Called called,
                                                           std::chrono::milliseconds longest,
                                                           const std::function<void()>& check, OnAnswer on_answer);
+  /// What the device answers to being made safe. Nothing: not yet, or it is not known.
+  rr::awaitable<std::optional<rr::Result<>>> wait_for_answer(SafeAnswerPtr safe);
   /// All that a generator gives, up to as many as are wanted.
   Answer run_generator(const Command& command, std::shared_ptr<ValueClient> client, const std::function<void()>& check,
                        AuditEntryPtr entry);

@@ -189,17 +189,23 @@ void ServiceLocks::end_leases() {
   while (auto ended = leases_.poll_event()) {
     const auto holder = holders_.extract(ended->lease.path);
     const auto upstream = open_upstream(holder ? holder.mapped().upstream.lock() : nullptr);
-    const bool is_safe = safe_->send(ended->lease.path, upstream, SafeValues::Why::lease_ended);
+    const auto safe = std::make_shared<SafeAnswer>(device_.executor(), device_.config().name, ended->lease.path);
+    const bool is_safe =
+        safe_->send(ended->lease.path, upstream, SafeValues::Why::lease_ended,
+                    [safe, why = ended->why, end = holder ? holder.mapped().end : nullptr](const rr::Result<>& answer) {
+                      if (end && answer) end->finish(Outcome::ok, why);
+                      if (end && !answer) end->finish(Outcome::error, why + "; " + answer.error().message);
+                      safe->set(answer);
+                    });
     const auto what = ended->why + (is_safe ? "" : "; the device is made safe when it is back");
     log(is_safe ? LogLevel::info : LogLevel::warning, "lease ended",
         {{"device", device_.config().name},
          {"path", ended->lease.path},
          {"user", ended->lease.by.name},
          {"reason", what}});
-    if (holder && holder.mapped().end) holder.mapped().end->finish(is_safe ? Outcome::ok : Outcome::error, what);
     const auto client = std::find_if(clients_.begin(), clients_.end(),
                                      [&](const auto& each) { return each.second == ended->lease.holder; });
-    if (client != clients_.end()) client->first->lease_ended(ended->lease.path, what);
+    if (client != clients_.end()) client->first->lease_ended(ended->lease.path, what, safe);
     device_.tell_lease({service_, std::move(ended->lease), false, what});
   }
 }

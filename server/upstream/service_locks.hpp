@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/access/audit_entry.hpp"
+#include "server/access/safe_answer.hpp"
 #include "server/upstream/lease_table.hpp"
 #include "server/upstream/lock_table.hpp"
 #include "server/upstream/safe_values.hpp"

@@ -60,8 +60,8 @@ class UpstreamClient {
   virtual bool may_lock(const std::string&) const { return true; }
   /// Whether it may write or call anything at or below an object still: who may not has no use for its lease.
   virtual bool may_command(const std::string&) const { return true; }
-  /// Its lease has ended.
-  virtual void lease_ended(const std::string&, const std::string&) const {}
+  /// Its lease has ended. `safe`  what the device answers to that.
+  virtual void lease_ended(const std::string&, const std::string&, const SafeAnswerPtr&) const {}
   /// The one that its requests go by.
   virtual std::shared_ptr<Upstream> upstream_in_use() const = 0;
   /// Whether the device may ask it by this callback.

@@ -83,6 +83,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void on_lease_ended(std::function<void(const std::string& path, const std::string& why)> handler) {
     on_lease_ended_ = std::move(handler);
   }
+  /// What the device answers to the end of its last lease; null: none has ended.
+  const SafeAnswerPtr& safe_answer() const { return safe_answer_; }
   /// Who it is, for what leases need of that. `needs_right`  whether it loses locks and leases with the right to lock.
   void set_standing(StandingPtr standing, bool needs_right = true) {
     standing_ = std::move(standing);
@@ -140,7 +142,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
   bool may_lock(const std::string& path) const override;
   bool may_command(const std::string& path) const override;
-  void lease_ended(const std::string& path, const std::string& why) const override {
+  void lease_ended(const std::string& path, const std::string& why, const SafeAnswerPtr& safe) const override {
+    safe_answer_ = safe;
     if (on_lease_ended_) on_lease_ended_(path, why);
   }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
@@ -181,7 +184,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   std::shared_ptr<Upstream> upstream_;
   Subject user_;
   std::function<void(const std::string&, const std::string&)> on_lease_ended_;
-  StandingPtr standing_;  ///< null: of nobody in particular
+  mutable SafeAnswerPtr safe_answer_;  ///< as the locks tell it, to whom a client is const
+  StandingPtr standing_;               ///< null: of nobody in particular
   bool needs_right_ = false;
   Device::Seat seat_;
   MemoryBudget::Charge memory_;

@@ -7,6 +7,8 @@ LEASES = {
     "safe": [{"property": "plain.speed", "value": 0}, {"wire": "plain.target", "value": -1}],
     "takeover": ["operator", "admin"],
 }
+REFUSED = {**LEASES, "safe": [{"call": "plain.ask", "arguments": ["may it stop?"]}]}  # whom nobody answers
+UNANSWERED = {**LEASES, "safe": [{"call": "plain.move", "arguments": [0]}]}  # until the device is told to finish
 
 
 def wait_for(is_so, within=10):

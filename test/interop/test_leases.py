@@ -386,7 +386,7 @@ def test_an_operator_takes_a_lease_over_and_all_of_it_is_recorded(node, tmp_path
             records = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
             return [(each["user"], each["event"], each["outcome"]) for each in records if each["event"].startswith("lease")]
         wait_for(lambda: len(ends()) == 5)
-        assert ends() == [("vera", "lease", "ok"), ("vera", "lease_end", "ok"), ("alice", "lease", "ok"),
+        assert ends() == [("vera", "lease", "ok"), ("alice", "lease", "ok"), ("vera", "lease_end", "ok"),
                           ("vera", "lease", "error"), ("alice", "lease_end", "ok")]
     finally:
         site.stop()

@@ -12,7 +12,7 @@ import pytest
 from agents import call, hostile_robot, lose_role, meanwhile, records, serving, with_tokens
 from http_api import ask
 from json_sockets import Socket
-from leases import LEASES, PLAIN, wait_for
+from leases import LEASES, PLAIN, REFUSED, UNANSWERED, wait_for
 from processes import start_gateway
 from shared_sites import Site
 
@@ -291,20 +291,52 @@ def outcomes_of_stops(made):
 
 
 def test_a_stop_that_the_device_refuses_is_an_error(lab):
-    made = lab(leases={**LEASES, "safe": [{"call": "plain.ask", "arguments": ["may it stop?"]}]})  # whom nobody answers
+    made = lab(leases=REFUSED)
     refused = stop_by(made)
     assert refused.is_error and "none of them is meant" in refused.structured_content["error"]["from_device"]
     assert outcomes_of_stops(made) == ["error"]
 
 
 def test_a_stop_that_the_device_has_not_answered_yet_is_told_as_sent(lab):
-    made = lab(leases={**LEASES, "safe": [{"call": "plain.move", "arguments": [0]}]})
+    made = lab(leases=UNANSWERED)
     sent = stop_by(made)
     assert not sent.is_error, sent.structured_content
     assert sent.structured_content["sent"] == "plain" and "stopped" not in sent.structured_content
     assert outcomes_of_stops(made) == []
     made.arm.finish()
     wait_for(lambda: outcomes_of_stops(made) == ["ok"])
+
+
+def ends_of_leases(made):
+    return [(each["outcome"], each["detail"]) for each in records(made.folder, "lease_end")]
+
+
+def test_an_agent_is_told_made_safe_when_the_device_has_taken_it(lab):
+    made = lab(rule(approval="none", hold_seconds=0))
+    assert made.set(1).structured_content["made_safe"] == "the lease was held for 0 s"
+    wait_for(lambda: ends_of_leases(made) == [("ok", "its holder has released it")])
+
+
+def test_an_agent_is_told_and_it_is_recorded_that_the_device_refuses_to_be_made_safe(lab):
+    made = lab(rule(approval="none", hold_seconds=0), leases=REFUSED)
+    done = made.set(1)
+    assert not done.is_error and done.structured_content["sent"] == {"speed": 1}
+    assert "none of them is meant" in done.structured_content["not_made_safe"]["from_device"]
+    assert "made_safe" not in done.structured_content
+    wait_for(lambda: ends_of_leases(made))
+    ((outcome, detail),) = ends_of_leases(made)
+    assert outcome == "error" and "released it; " in detail and "none of them is meant" in detail
+
+
+def test_an_agent_is_told_that_it_is_not_known_whether_the_device_is_safe(lab):
+    made = lab(rule(approval="none", hold_seconds=0), leases=UNANSWERED)
+    done = made.set(1)
+    assert not done.is_error and "not known" in done.structured_content["unanswered"]
+    assert not {"made_safe", "not_made_safe"} & done.structured_content.keys()
+    assert ends_of_leases(made) == []
+    made.arm.finish()
+    wait_for(lambda: ends_of_leases(made))
+    assert ends_of_leases(made)[0][0] == "ok"
 
 
 def test_an_agent_is_told_what_it_may_and_on_which_terms(lab):

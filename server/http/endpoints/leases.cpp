@@ -55,6 +55,15 @@ rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, st
   co_return holder;
 }
 
+rr::OrderedJson stop_to_json(const SafeAnswer& safe) {
+  auto out = rr::OrderedJson::object();
+  const auto& result = safe.result();
+  rr::add_key(out, !result ? "sent" : *result ? "stopped" : "refused") = safe.path();
+  if (!result) rr::add_key(out, "unanswered") = unanswered_stop;
+  if (result && !*result) out.update(rr::error_to_json(result->error(), {}));
+  return out;
+}
+
 bool takes_lease(const Request& request) {
   const auto what = rr::query_value(request.query(), "lease");
   return what == "acquire" || what == "take";

@@ -30,6 +30,10 @@ enum class LeaseNeeds : std::uint8_t { right_to_lock, nothing };
 rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, std::shared_ptr<ValueClient> asker,
                                                        Identity who, std::string path, rr::LockCommand command,
                                                        milliseconds deadman, LeaseNeeds needs);
+inline constexpr std::string_view unanswered_stop = "the device has not answered yet: whether it is safe is not known";
+/// What has become of an object that was to be made safe: {"stopped": PATH}; {"sent": PATH, "unanswered": why}, where
+/// the device has not answered yet; or {"refused": PATH, "error": as of the device}.
+rr::OrderedJson stop_to_json(const SafeAnswer& safe);
 /// Throws   rr::Exception.
 rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target);
 

@@ -136,6 +136,7 @@ class HearingClient final : public UpstreamClient {
   std::function<void(rr::EventPacket&)> on_event;
   std::function<void(rr::WirePacket&)> on_wire;
   std::function<void()> on_lease_ended;
+  mutable SafeAnswerPtr safe_answer;                                            ///< to the end of its last lease
   std::function<void(const rr::ClientConnection::CallbackReply&)> on_callback;  ///< none: it answers none
   bool can_command = true;
   std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
@@ -144,7 +145,8 @@ class HearingClient final : public UpstreamClient {
   std::weak_ptr<const void> life() const override { return life_; }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
   bool may_command(const std::string&) const override { return can_command; }
-  void lease_ended(const std::string&, const std::string&) const override {
+  void lease_ended(const std::string&, const std::string&, const SafeAnswerPtr& safe) const override {
+    safe_answer = safe;
     if (on_lease_ended) on_lease_ended();
   }
   bool may_answer(const std::string&, const rr::MemberDefinition&) const override { return on_callback != nullptr; }
