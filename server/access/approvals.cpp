@@ -76,27 +76,27 @@ rr::Result<Approval> Approvals::answer(const std::string& id, const Identity& by
   return out;
 }
 
-std::size_t Approvals::stop(std::chrono::minutes time, Time now) {
-  std::size_t count = 0;
+Approvals::Stopped Approvals::stop(std::chrono::minutes time, Time now) {
+  Stopped out;
   stopped_until_ = time == time.zero() ? now : std::max(now + time, stopped_until_);
   grants_.clear();
   for (const auto& each : asked_)
     if (const auto asked = each.lock()) {  // also what was allowed just now, and is not begun
-      if (asked->state_ == ApprovalState::pending) ++count;
+      if (asked->state_ == ApprovalState::pending) ++out.commands;
       asked->state_ = ApprovalState::denied;
       asked->wake_();
     }
   for (const auto& each : running_)
-    if (const auto wake = each.lock()) {
-      (*wake)();
-      ++count;
+    if (const auto end = each.lock()) {
+      if (auto answer = (*end)()) out.answers.push_back(std::move(answer));
+      ++out.commands;
     }
-  return count;
+  return out;
 }
 
-std::shared_ptr<const void> Approvals::watch_stop(Wake wake) {
+std::shared_ptr<const void> Approvals::watch_stop(End end) {
   std::erase_if(running_, [](const auto& each) { return each.expired(); });
-  auto kept = std::make_shared<const Wake>(std::move(wake));
+  auto kept = std::make_shared<const End>(std::move(end));
   running_.push_back(kept);
   return kept;
 }

@@ -12,6 +12,7 @@
 
 #include "core/support/error.hpp"
 #include "server/access/access_rules.hpp"
+#include "server/access/safe_answer.hpp"
 
 namespace rrgate {
 
@@ -45,6 +46,13 @@ class Approvals {
   using Clock = std::chrono::steady_clock;  ///< one that nobody sets: a step would end a stop, or prolong a grant
   using Time = Clock::time_point;
   using Wake = std::function<void()>;
+  /// Ends a command. Returns  what the device answers to that; null: nothing made it safe.
+  using End = std::function<SafeAnswerPtr()>;
+  /// What stop() has ended.
+  struct Stopped {
+    std::size_t commands = 0;
+    std::vector<SafeAnswerPtr> answers = {};  ///< of devices that were made safe
+  };
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_of_subject = 4;
   static constexpr std::size_t max_values = 16 * 1024;  ///< bytes: nobody judges more
@@ -81,13 +89,12 @@ class Approvals {
                               Time now);
 
   /// Agents command nothing for so long, and as long as an earlier stop says; 0: they go on at once. What waits is
-  /// denied, what is allowed for some time is not any more, and what goes on is told. Returns how many commands that
-  /// were.
-  std::size_t stop(std::chrono::minutes time, Time now);
+  /// denied, what is allowed for some time is not any more, and what goes on is ended.
+  Stopped stop(std::chrono::minutes time, Time now);
   bool is_stopped(Time now) const { return now < stopped_until_; }
   Time stopped_until() const { return stopped_until_; }
-  /// Calls `wake` at stop(), as long as what is returned is kept.
-  std::shared_ptr<const void> watch_stop(Wake wake);
+  /// Calls `end` at stop(), as long as what is returned is kept.
+  std::shared_ptr<const void> watch_stop(End end);
 
  private:
   static std::string key_of(const WantedCommand& command);
@@ -95,7 +102,7 @@ class Approvals {
 
   std::list<std::weak_ptr<Asked>> asked_;  ///< the oldest first
   std::map<std::string, Time> grants_;     ///< until when, by key_of()
-  std::list<std::weak_ptr<const Wake>> running_;
+  std::list<std::weak_ptr<const End>> running_;
   Time stopped_until_{};
 };
 

@@ -13,7 +13,7 @@ import RobotRaconteur as RR
 
 from http_api import ask
 from json_sockets import Socket
-from leases import LEASES, PLAIN, wait_for
+from leases import LEASES, PLAIN, REFUSED, UNANSWERED, wait_for
 from news import News
 from processes import free_port, start_gateway
 from shared_sites import RETRY, Site, is_refused, port_of, start_arm_v2
@@ -257,6 +257,34 @@ def test_requests_of_http_show_the_key_of_their_lease(site):
     wait_for(lambda: ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=200").status == 200, 2)
     for query in ("lease=borrow", "lease=acquire", "lease=acquire&deadman=soon", "lease=acquire&deadman=5"):
         assert ask(site.port, "POST", f"{PLAIN}?{query}").status == 400, query
+
+
+def release_by_http(port):
+    taken = ask(port, "POST", PLAIN + "?lease=acquire&deadman=20000").json["lease"]
+    key = {"Rrgate-Lease": taken}
+    released = ask(port, "POST", PLAIN + "?lease=release", headers=key)
+    assert ask(port, "PUT", PLAIN + "/speed", 1, key).status == 423  # it has ended
+    return released
+
+
+def test_a_release_by_http_fails_with_what_the_device_says_where_it_refuses_to_be_made_safe(node, tmp_path):
+    site = Site(tmp_path, node, {"leases": REFUSED})
+    try:
+        refused = release_by_http(site.port)
+        assert refused.status >= 400 and "none of them is meant" in refused.json["error"]["message"]
+    finally:
+        site.stop()
+
+
+def test_a_release_by_http_says_that_the_device_has_not_answered_yet(node, tmp_path):
+    site = Site(tmp_path, node, {"leases": UNANSWERED})
+    try:
+        arm = site.direct("plain")
+        sent = release_by_http(site.port)
+        assert sent.status == 202 and sent.json["sent"] == "plain" and "not known" in sent.json["unanswered"]
+        arm.finish()
+    finally:
+        site.stop()
 
 
 def test_a_device_that_was_away_is_made_safe_when_it_is_back(site):

@@ -339,6 +339,20 @@ def test_an_agent_is_told_that_it_is_not_known_whether_the_device_is_safe(lab):
     assert ends_of_leases(made)[0][0] == "ok"
 
 
+@pytest.mark.parametrize(("leases", "word"), [(LEASES, "stopped"), (REFUSED, "refused"), (UNANSWERED, "sent")])
+def test_a_stop_of_all_agents_tells_what_the_devices_answer(lab, leases, word):
+    made = lab(rule(approval="none", hold_seconds=50), leases=leases)
+    with meanwhile(lambda: made.set(1)) as results:
+        wait_for(lambda: made.arm.speed == 1)
+        stopped = made.stop_agents(minutes=1)
+    (device,) = stopped["devices"]
+    assert (stopped["ended"], device["device"], device[word]) == (1, "interop", "plain")
+    assert ("none of them is meant" in device["error"]["message"]) if word == "refused" else "error" not in device
+    assert ("not known" in device["unanswered"]) if word == "sent" else "unanswered" not in device
+    assert "stopped" in made.refusal(results[0])
+    made.arm.finish()
+
+
 def test_an_agent_is_told_what_it_may_and_on_which_terms(lab):
     made = lab({"roles": ["agent"], "members": ["speed"], "may": ["read", "write"],
                 "agent": {"limits": {"speed": [0, 1]}, "lease": False}})

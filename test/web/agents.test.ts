@@ -121,7 +121,7 @@ describe("agents", () => {
     limits.mockRestore();
   });
 
-  it("are stopped at once, whatever was asked before, or it is told why not within 2 s", async () => {
+  it("are stopped at once, whatever was asked before, or it is told why not within 4 s", async () => {
     const limits = vi.spyOn(AbortSignal, "timeout");
     const session = setup();
     const desk = new AgentsDesk(session);
@@ -132,7 +132,7 @@ describe("agents", () => {
     const old = desk.look();
     session.fetch.mockResolvedValueOnce(answer(200, {})).mockReturnValueOnce(new Promise(() => undefined));
     await desk.stop(10);
-    expect(limits).toHaveBeenCalledWith(2_000);
+    expect(limits).toHaveBeenCalledWith(4_000);
     tellOld(answer(200, { stopped_for: 0 }));
     await old;
     expect(desk.state.value?.stoppedUntil).toBeGreaterThan(Date.now() + 590_000);
@@ -168,6 +168,32 @@ describe("agents", () => {
       .map(([, given]) => given?.body);
     expect(stops.slice(-2)).toEqual(['{"minutes":10}', '{"minutes":0}']);
     expect(desk.trouble.value).toBeNull();
+  });
+});
+
+describe("a stop of all agents", () => {
+  const stop = (devices: unknown) => {
+    const session = setup();
+    session.fetch.mockImplementation(() => Promise.resolve(answer(200, { ended: 1, stopped_for: 600, devices })));
+    return new AgentsDesk(session).stop(10);
+  };
+
+  it("has arrived when all devices have answered that they are safe", async () => {
+    expect(await stop([{ device: "arm", stopped: "Arm" }])).toBeUndefined();
+  });
+
+  it("says which device has not answered yet", async () => {
+    const devices = [
+      { device: "arm", stopped: "Arm" },
+      { device: "cart", sent: "Cart", unanswered: "not yet" },
+    ];
+    expect(await stop(devices)).toContain("not answered yet: cart");
+  });
+
+  it("has failed where a device refuses", async () => {
+    await expect(stop([{ device: "arm", refused: "Arm", error: { message: "stuck" } }])).rejects.toThrow(
+      "arm refuses: stuck",
+    );
   });
 });
 

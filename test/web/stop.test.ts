@@ -99,14 +99,15 @@ describe("a stop over a connection that has broken unnoticed", () => {
   });
 
   /** What is fetched, and what is said in the end. */
-  async function pressStop(code: keyof typeof ErrorCode, safe: string[]) {
+  async function pressStop(code: keyof typeof ErrorCode, safe: string[], released = 204) {
     const device = makeDevice();
     const error = Object.create(RobotRaconteurError.prototype) as RobotRaconteurError;
     device.urgent.mockRejectedValue(Object.assign(error, { code: ErrorCode[code], message: "of the connection" }));
     const fetched: string[] = [];
     vi.spyOn(session, "fetch").mockImplementation((path) => {
       fetched.push(path);
-      return Promise.resolve(Response.json({ lease: "key" }));
+      const isRelease = path.endsWith("release");
+      return Promise.resolve(isRelease ? new Response(null, { status: released }) : Response.json({ lease: "key" }));
     });
     const place = { device: "robot", service: "Create" };
     show(StopButton, { object: device as unknown as Remote, stop: { call: "halt", args: [] }, place, safe });
@@ -119,6 +120,15 @@ describe("a stop over a connection that has broken unnoticed", () => {
   it.each(["RequestTimeout", "ConnectionError"] as const)("is passed on by the gateway: %s", async (code) => {
     const passed = [["take", "release"], "passed", expect.stringContaining("passed on by the gateway")];
     expect(await pressStop(code, ["Create.Drive"])).toEqual(passed);
+  });
+
+  it("says whether the device has answered the gateway", async () => {
+    const words = async (status: number) => (await pressStop("ConnectionError", ["Create.Drive"], status))[2];
+    expect(await words(204)).toContain("the device has answered");
+    clear();
+    expect(await words(202)).toContain("the device's answer is not known");
+    clear();
+    expect(await words(423)).toContain("NOT STOPPED");
   });
 
   it("has failed where the gateway knows of nothing that is safe, or the device has answered", async () => {

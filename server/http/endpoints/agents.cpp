@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "server/http/endpoints/gateway_request.hpp"
+#include "server/http/endpoints/leases.hpp"
 #include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
@@ -103,6 +104,22 @@ Response answer_approval(GatewayState& gateway, const Request& request, const st
   return json_answer(200, {{"state", is_allowed ? "allowed" : "denied"}});
 }
 
+/// When the devices have answered, or need not be waited for any longer.
+rr::awaitable<void> answer_stop(GatewayState& gateway, ResponseWriter& writer, Approvals::Stopped stopped) {
+  auto devices = rr::OrderedJson::array();
+  for (const auto& safe : stopped.answers) {
+    co_await safe->wait();
+    auto& device = devices.emplace_back(rr::OrderedJson{{"device", safe->device()}});
+    device.update(stop_to_json(*safe));
+  }
+  auto out = rr::OrderedJson::object();
+  rr::add_key(out, "ended") = stopped.commands;
+  rr::add_key(out, "stopped_for") = seconds_until(gateway.approvals().stopped_until());
+  rr::add_key(out, "devices") = std::move(devices);
+  const auto response = json_answer(200, out);
+  co_await writer.send(response);
+}
+
 }  // namespace
 
 Handler approvals_endpoint(GatewayState& gateway) {
@@ -148,12 +165,16 @@ Handler stop_agents_endpoint(GatewayState& gateway) {
     const auto time = minutes_of(*body, 0, Approvals::longest_stop, minutes(10));
     if (!time) return error_answer(time.error());
     const auto now = Approvals::Clock::now();
-    const auto ended = gateway.approvals().stop(*time, now);
+    const auto stopped = gateway.approvals().stop(*time, now);
     const auto left = std::chrono::ceil<minutes>(gateway.approvals().stopped_until() - now).count();
     log(LogLevel::warning, "agents stopped", {{"user", request.identity.name}, {"minutes", left}});
-    const auto detail = std::to_string(ended) + " commands ended, for " + std::to_string(left) + " minutes";
+    const auto detail = std::to_string(stopped.commands) + " commands ended, for " + std::to_string(left) + " minutes";
     gateway.access().record({.event = "agents_stopped", .who = &request.identity, .detail = detail});
-    return json_answer(200, {{"ended", ended}, {"stopped_for", seconds_until(gateway.approvals().stopped_until())}});
+    Response response;
+    response.answer_later = [&gateway, stopped](ResponseWriter& writer) {
+      return answer_stop(gateway, writer, stopped);
+    };
+    return response;
   };
 }
 

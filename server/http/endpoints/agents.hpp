@@ -15,8 +15,8 @@ Handler approval_endpoint(GatewayState& gateway);
 /// GET /api/v1/agents/sessions, for admins: {"sessions": [{"user", "client", "program", "begun_ago", "used_ago",
 /// "ended", "reads", "commands", "last_commands": [{"ago", "tool", "device", "path", "values", "state", "detail"}]}]}.
 Handler agent_sessions_endpoint(GatewayState& gateway);
-/// POST /api/v1/agents/stop {"minutes": N}, for admins: {"ended": commands, "stopped_for": seconds}. 0 minutes: what
-/// goes on ends, and agents may go on.
+/// POST /api/v1/agents/stop {"minutes": N}, for admins: {"ended": commands, "stopped_for": seconds, "devices":
+/// [{"device", and what stop_to_json() gives}]}. 0 minutes: what goes on ends, and agents may go on.
 Handler stop_agents_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

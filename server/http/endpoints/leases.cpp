@@ -101,8 +101,15 @@ rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target&
            "lease is " + rr::quote(what) + ", expected acquire, take, renew or release");
   auto path = target.path();
   const auto command = what == "renew" ? rr::LockCommand::renew_lease : rr::LockCommand::release_lease;
-  co_await target.client->lock(command, std::move(path));
-  co_return request.written_response();
+  co_await target.client->lock(command, path);
+  const auto safe = what == "release" ? target.client->safe_answer() : nullptr;
+  if (safe) co_await safe->wait();
+  if (!safe || (safe->result() && *safe->result())) co_return request.written_response();
+  if (safe->result()) throw rr::Exception(safe->result()->error());
+  auto told = stop_to_json(*safe);
+  auto response = co_await request.value_response(std::move(told));
+  response.status = 202;
+  co_return response;
 }
 
 }  // namespace rrgate

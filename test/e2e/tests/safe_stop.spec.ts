@@ -25,7 +25,7 @@ for (const view of ["members", "board"]) {
       await put(page);
       await stop();
       await expect.poll(() => read(page)).toBe(0);
-      await expect(page.locator('[data-stop="passed"]')).toContainText("passed on by the gateway after"); // it hears no answer
+      await expect(page.locator('[data-stop="passed"]')).toContainText("the device has answered");
     }
     await put(page); // nobody has the lease any more
   });

@@ -1,6 +1,7 @@
 // What agents ask a person for: bounded, soon over, and allowed by nobody who asks.
 #include "server/access/approvals.hpp"
 
+#include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
 
 #include "test/support/print.hpp"
@@ -138,10 +139,21 @@ TEST_CASE("approvals: stop denies what waits and what was allowed but not begun,
   const auto allowed = *approvals.ask(drive(), ignore, end, start);
   REQUIRE(approvals.answer(allowed->approval().id, who("root"), true, minutes(60), start));
   int told = 0;
-  const auto running = approvals.watch_stop([&] { ++told; });
-  approvals.watch_stop([&] { told += 100; });  // is over at once
+  const auto running = approvals.watch_stop([&]() -> SafeAnswerPtr {
+    ++told;
+    return nullptr;
+  });
+  boost::asio::io_context io;
+  const auto answer = std::make_shared<SafeAnswer>(io.get_executor(), "arm", "Arm");
+  const auto leased = approvals.watch_stop([&] { return answer; });
+  approvals.watch_stop([&]() -> SafeAnswerPtr {  // is over at once
+    told += 100;
+    return nullptr;
+  });
   CHECK_FALSE(approvals.is_stopped(start));
-  CHECK(approvals.stop(minutes(10), start) == 2);
+  const auto stopped = approvals.stop(minutes(10), start);
+  CHECK(stopped.commands == 3);
+  CHECK(stopped.answers == std::vector{answer});
   CHECK(woken == 1);
   CHECK(told == 1);
   CHECK(waiting->state() == ApprovalState::denied);

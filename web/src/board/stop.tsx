@@ -19,7 +19,7 @@ type State =
   | { kind: "ready" }
   | { kind: "sent"; at: number }
   | { kind: "arrived"; tookMs: number; time: number }
-  /** To a gateway that has sent it: it tells nothing of the device's answer. */
+  /** By the gateway, which tells what the device has answered. */
   | { kind: "passed"; how: string }
   | { kind: "failed"; why: string };
 
@@ -54,11 +54,13 @@ export async function stopWithout(
 ): Promise<string> {
   if (safe.length === 0) throw cause;
   const at = performance.now();
-  await makeSafe(device, service).catch((error: unknown) => {
+  const isAnswered = await makeSafe(device, service).catch((error: unknown) => {
     throw new Error(withSignIn(explain(error)), { cause: error });
   });
   const took = (performance.now() - at).toFixed(0);
-  return t("passed on by the gateway after {0} ms, {1}; the device's answer is not known", took, clockTime(Date.now()));
+  return isAnswered
+    ? t("passed on by the gateway after {0} ms, {1}; the device has answered", took, clockTime(Date.now()))
+    : t("passed on by the gateway after {0} ms, {1}; the device's answer is not known", took, clockTime(Date.now()));
 }
 
 function withSignIn(why: string): string {

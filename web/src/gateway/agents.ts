@@ -1,6 +1,7 @@
 // What agents wait to be allowed to do, deciding on it, and stopping them all.
 // Layer: web/gateway. Source: /api/v1/agents. A gateway that has no agents answers 404.
 
+import { t } from "../app/language";
 import { Store } from "../app/store";
 import { ApprovalNotices } from "./approval_notices";
 import { isRecord, text } from "./fields";
@@ -41,7 +42,7 @@ const PATH = "api/v1/agents";
 const POLL_MS = 2_000;
 const RARE_POLL_MS = 60_000;
 const TIMEOUT_MS = 5_000;
-const STOP_TIMEOUT_MS = 2_000;
+const STOP_TIMEOUT_MS = 4_000; // the gateway waits 2 s for the answers of devices
 
 export class AgentsDesk {
   /** null: the gateway has none, or this user does not decide. */
@@ -92,11 +93,16 @@ export class AgentsDesk {
     return this.#send(`approvals/${encodeURIComponent(approval.id)}`, answer);
   }
 
-  /** Ends what they do, and lets them do nothing for so long. @throws (rejects) why they may go on. */
-  async stop(minutes: number): Promise<void> {
-    await this.#post("stop", { minutes }, STOP_TIMEOUT_MS);
+  /**
+   * Ends what they do, and lets them do nothing for so long.
+   * @returns in words, which devices have not answered yet that they are safe; nothing: there are none.
+   * @throws (rejects) why they may go on, or why a device may not be safe.
+   */
+  async stop(minutes: number): Promise<string | void> {
+    const response = await this.#post("stop", { minutes }, STOP_TIMEOUT_MS);
     if (this.state.value) this.state.value = { ...this.state.value, stoppedUntil: Date.now() + minutes * 60_000 };
     void this.look();
+    return tellStopped(await response.json());
   }
 
   letGoOn(): Promise<void> {
@@ -115,7 +121,7 @@ export class AgentsDesk {
   }
 
   /** @throws Error (rejects), for people. */
-  async #post(path: string, body: object, timeoutMs: number): Promise<void> {
+  async #post(path: string, body: object, timeoutMs: number): Promise<Response> {
     const init = {
       method: "POST",
       headers: { ["Content-Type"]: "application/json" },
@@ -125,7 +131,7 @@ export class AgentsDesk {
     const response = await this.#session.fetch(`${PATH}/${path}`, init).catch((error: unknown) => {
       throw new Error(reasonOf(error), { cause: error });
     });
-    await expectOk(response);
+    return expectOk(response);
   }
 
   async #lookAgain(): Promise<void> {
@@ -133,6 +139,18 @@ export class AgentsDesk {
     const isThere = isAsleep || (await this.look());
     setTimeout(() => void this.#lookAgain(), isThere ? POLL_MS : RARE_POLL_MS);
   }
+}
+
+/** See AgentsDesk.stop(). */
+function tellStopped(answer: unknown): string | void {
+  const devices: unknown[] = isRecord(answer) && Array.isArray(answer["devices"]) ? answer["devices"] : [];
+  const unanswered: string[] = [];
+  for (const each of devices.filter(isRecord)) {
+    const error = each["error"];
+    if (isRecord(error)) throw new Error(t("{0} refuses: {1}", text(each["device"]), text(error["message"])));
+    if (text(each["unanswered"]) !== "") unanswered.push(text(each["device"]));
+  }
+  if (unanswered.length > 0) return t("agents are stopped; not answered yet: {0}", unanswered.join(", "));
 }
 
 export function readAgents(answer: unknown, now = Date.now()): Agents {

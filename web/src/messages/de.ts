@@ -222,6 +222,8 @@ const german: Readonly<Record<string, string>> = {
   "{0}. Sign in, then press Stop again.": "{0}. Anmelden, dann noch einmal Stopp drücken.",
   object: "Objekt",
   "such as Webcams[0]; may be empty": "etwa Webcams[0]; darf leer sein",
+  "passed on by the gateway after {0} ms, {1}; the device has answered":
+    "vom Gateway weitergegeben nach {0} ms, {1}; das Gerät hat geantwortet",
   "passed on by the gateway after {0} ms, {1}; the device's answer is not known":
     "vom Gateway weitergegeben nach {0} ms, {1}; was das Gerät antwortet, ist nicht bekannt",
   "sent, no answer yet": "gesendet, noch keine Antwort",
@@ -530,6 +532,8 @@ const german: Readonly<Record<string, string>> = {
   "Agents are stopped for {0}.": "Agenten sind für {0} angehalten.",
   "Let agents go on": "Agenten weitermachen lassen",
   "Stop all agents": "Alle Agenten anhalten",
+  "agents are stopped; not answered yet: {0}": "Agenten sind angehalten; noch ohne Antwort: {0}",
+  "{0} refuses: {1}": "{0} verweigert es: {1}",
   "Notify me of requests": "Anfragen als Mitteilung zeigen",
   "The agent of {0} asks to do this:": "Der Agent von {0} möchte dies tun:",
   "It does not say why.": "Er sagt nicht, warum.",
