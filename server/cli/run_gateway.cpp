@@ -1,8 +1,14 @@
 #include "server/cli/run_gateway.hpp"
 
+#include <algorithm>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <csignal>
 #include <filesystem>
+#include <limits>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "server/cli/command.hpp"
 #include "server/cli/config_file.hpp"
@@ -33,16 +39,63 @@ class Heartbeat {
   std::optional<std::chrono::milliseconds> period_;
 };
 
+/// glibc takes large blocks from the heap once one of their size was freed, and keeps them there: with each thread that
+/// judges a password, the 16 MB of that. Blocks of this size and more are the system's again as soon as they are free;
+/// of smaller ones, each heap keeps as much as glibc would for blocks of this size.
+void give_large_blocks_back() {
+#ifdef __GLIBC__
+  constexpr int large = 8 * 1024 * 1024;
+  mallopt(M_MMAP_THRESHOLD, large);
+  mallopt(M_TRIM_THRESHOLD, 2 * large);
+#endif
+}
+
+/// Gives the free pages of the heap back after a crowd has gone: those between what others hold stay resident
+/// otherwise.
+class FreePages {
+ public:
+  explicit FreePages(boost::asio::io_context& io) : timer_(io) {}
+
+  void start() {
+    timer_.expires_after(period);
+    timer_.async_wait([this](const rr::error_code& error) {
+      if (error) return;
+      look();
+      start();
+    });
+  }
+  void stop() { timer_.cancel(); }
+
+ private:
+  static constexpr std::chrono::seconds period{5};
+  static constexpr std::size_t worth = 16 * 1024 * 1024;  // no trim for what messages alone make come and go
+
+  void look() {
+#ifdef __GLIBC__
+    const std::size_t free = mallinfo2().fordblks;  // resident or not
+    least_ = std::min(least_, free);
+    if (free - least_ < worth) return;
+    malloc_trim(0);
+    least_ = free;
+#endif
+  }
+
+  boost::asio::steady_timer timer_;
+  std::size_t least_ = std::numeric_limits<std::size_t>::max();  ///< that was free since the last time
+};
+
 }  // namespace
 
 int run_gateway(Config config, const OnStarted& on_started, const std::string& config_file) {
   std::signal(SIGPIPE, SIG_IGN);
+  give_large_blocks_back();
   complete_config(config);
 
   boost::asio::io_context io(1);
   Gateway gateway(io, std::move(config));
   ConfigFile file(io, gateway, config_file);
   Heartbeat heartbeat(io);
+  FreePages free_pages(io);
   boost::asio::signal_set signals(io, SIGTERM, SIGINT, SIGHUP);
   bool has_stopped = false;
   std::function<void()> wait_for_signal = [&] {
@@ -61,6 +114,7 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
       gateway.stop([&] {
         has_stopped = true;
         heartbeat.stop();
+        free_pages.stop();
         signals.cancel();
       });
     });
@@ -77,6 +131,7 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
   on_started(io, gateway, *addresses);
   file.watch();
   heartbeat.start();
+  free_pages.start();
   notify_service_manager("READY=1\nSTATUS=serving");
 
   io.run();  // returns when everything has ended by itself: nothing outlives what it refers to
