@@ -205,6 +205,7 @@ void SharedClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
   settle(lent, now);
   if (is_behind_ || is_closed() || session_.queued_bytes() <= much_waiting()) return;
   is_behind_ = true;
+  home_->pace(*this);
   if (std::exchange(was_behind_, true)) return;
   log(LogLevel::info, "client reads slowly: the device is held back on its pipes, as far as it minds credit",
       {{"peer", peer()}, {"waiting_bytes", session_.queued_bytes()}});
@@ -216,7 +217,7 @@ void SharedClient::has_written() {
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
   post([this, weak] {
     const auto self = weak.lock();
-    if (self && service_ && !is_behind_) home_->caught_up(*this);
+    if (self && service_ && !is_behind_) home_->pace(*this);
   });
 }
 

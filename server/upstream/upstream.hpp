@@ -77,7 +77,7 @@ class UpstreamClient {
   virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
   virtual void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) = 0;
   /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
-  /// Upstream::caught_up() that this is over.
+  /// Upstream::pace() when this has changed.
   virtual bool is_behind() const = 0;
   /// Packets of its own have arrived.
   virtual void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) = 0;
@@ -229,8 +229,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// `wants_ack`  the client's number of the packet, for acknowledge_packets(), where it wants to hear of it.
   rr::Result<> send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
                          std::optional<std::uint32_t> wants_ack);
-  /// The client is not behind any more.
-  void caught_up(UpstreamClient& client);
+  /// The client is behind now, or not any more.
+  void pace(UpstreamClient& client);
   /// Which of the packets that are on their way will arrive nobody knows: the endpoints that the client has sent on
   /// end.
   void end_sent_pipes(UpstreamClient& client);

@@ -203,11 +203,12 @@ void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::strin
   const MemberKey key(path, member.name);
   if (is_shared) {
     if (const auto known = shared_pipes_.find(key); known != shared_pipes_.end()) {
-      auto& pipe = pipes_.at(known->second);
+      const auto number = known->second;
+      auto& pipe = pipes_.at(number);
       pipe.endpoints.push_back(endpoint);
-      endpoints_[endpoint] = known->second;
+      endpoints_[endpoint] = number;
       if (pipe.state == AttachState::attached) client.accept_pipe(id);
-      return;
+      return pace_pipe(number);
     }
   }
   const auto number = ++last_pipe_;
@@ -245,7 +246,6 @@ void Upstream::attach_pipe(PipeNumber number) {
     for (const auto& endpoint : endpoints)
       if (self->endpoints_left_ == left || self->endpoints_.contains(endpoint))
         endpoint.first->receive_packet(endpoint.second, shared);
-    self->pace_pipe(number);
   };
   handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {
     if (const auto self = weak.lock()) self->pass_back_acks(number, numbers);
@@ -401,7 +401,7 @@ std::vector<Upstream::PipeNumber> Upstream::pipes_of(const UpstreamClient& clien
 
 // --- credit ---
 
-void Upstream::caught_up(UpstreamClient& client) {
+void Upstream::pace(UpstreamClient& client) {
   for (const auto number : pipes_of(client)) pace_pipe(number);
 }
 

@@ -139,6 +139,8 @@ class HearingClient final : public UpstreamClient {
   mutable SafeAnswerPtr safe_answer;                                            ///< to the end of its last lease
   std::function<void(const rr::ClientConnection::CallbackReply&)> on_callback;  ///< none: it answers none
   bool can_command = true;
+  bool reads_slowly = false;
+  mutable int times_asked = 0;     ///< whether it does
   std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
 
  private:
@@ -165,8 +167,11 @@ class HearingClient final : public UpstreamClient {
   }
   void accept_pipe(rr::PipeId) override { heard.push_back("pipe accepted"); }
   void refuse_pipe(rr::PipeId, const rr::Error&) override { heard.push_back("pipe refused"); }
-  void receive_packet(rr::PipeId, rr::SharedPipePacket&) override {}
-  bool is_behind() const override { return false; }
+  void receive_packet(rr::PipeId, rr::SharedPipePacket&) override { heard.push_back("packet"); }
+  bool is_behind() const override {
+    ++times_asked;
+    return reads_slowly;
+  }
   void acknowledge_packets(rr::PipeId, std::span<const std::uint32_t>) override {}
   void close_pipe(rr::PipeId) override { heard.push_back("pipe closed"); }
   void release_path(const std::string& path) override { heard.push_back("released " + path); }

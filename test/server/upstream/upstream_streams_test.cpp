@@ -32,6 +32,42 @@ TEST_CASE("a wire's value is packed once, however many turns its clients take") 
   }
 }
 
+TEST_CASE("a device is held back on a pipe by whoever is behind, as soon as it joins, and no packet asks for that") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  const auto& pipe = *bench.upstream->object_type("bench")->find_member("news");
+  const auto has_heard = [&](const HearingClient& client, std::size_t count) {
+    return bench.run_until([&] { return client.heard.size() == count; });
+  };
+  // An endpoint takes no packet while the one before it is not acknowledged.
+  const auto send = [&] { return device.service->pipe("news").broadcast(rr::Value(1), 0) == 1; };
+  // Acknowledgements that are not held are with the device when it has answered.
+  const auto read = [&](HearingClient& client) {
+    const auto answer = bench.ask(client, rr::CallKind::property_get, "bench", "number");
+    REQUIRE(bench.run_until([&] { return answer->has_value(); }));
+  };
+  HearingClient first(bench.upstream);
+  bench.upstream->join_pipe(first, 1, "bench", pipe);
+  REQUIRE(has_heard(first, 1));
+  first.times_asked = 0;
+  REQUIRE(send());
+  REQUIRE(has_heard(first, 2));
+  CHECK(first.times_asked == 0);
+  HearingClient second(bench.upstream);
+  second.reads_slowly = true;
+  bench.upstream->join_pipe(second, 1, "bench", pipe);
+  read(first);
+  REQUIRE(send());
+  REQUIRE(has_heard(second, 2));
+  read(first);
+  CHECK_FALSE(send());
+  second.reads_slowly = false;
+  bench.upstream->pace(second);
+  bool is_sent = false;
+  CHECK(bench.run_until([&] { return is_sent = is_sent || send(); }));
+}
+
 TEST_CASE("wires that were joined anew by a session that was lost at once are joined by the next one") {
   const std::string path = "bench.parts[1]";  // which the device is asked for
   Counting device;
