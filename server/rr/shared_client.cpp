@@ -145,8 +145,7 @@ void SharedClient::handle(const rr::WireReceived& received) {
     log(LogLevel::info, "values of a wire are not passed on: " + sent.error().message, {{"peer", peer()}});
 }
 
-void SharedClient::receive_wire(rr::WirePacket& packet) {
-  const auto now = rr::read_clocks();
+void SharedClient::receive_wire(rr::WirePacket& packet, rr::Now now) {
   rr::LentMessage lent;
   (void)session_.send_wire(packet, now, &lent);  // a lost connection is heard of by itself
   settle(lent, now);
@@ -197,8 +196,7 @@ void SharedClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
   settle();
 }
 
-void SharedClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
-  const auto now = rr::read_clocks();
+void SharedClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet, rr::Now now) {
   rr::LentMessage lent;
   const auto sent = session_.send_pipe_packet(id, packet, now, &lent);
   if (!sent && sent.error().code == rr::ErrorCode::out_of_system_resource) return end_too_slow(sent.error());
@@ -266,8 +264,7 @@ void SharedClient::end_soon(std::string reason) {
 
 // --- events, callbacks ---
 
-void SharedClient::receive_event(rr::EventPacket& packet) {
-  const auto now = rr::read_clocks();
+void SharedClient::receive_event(rr::EventPacket& packet, rr::Now now) {
   rr::LentMessage lent;
   (void)session_.send_event(packet, now, &lent);  // a lost connection is heard of by itself
   settle(lent, now);

@@ -90,14 +90,14 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, &callback);
   }
-  void receive_event(rr::EventPacket& packet) override;
-  void receive_wire(rr::WirePacket& packet) override;
+  void receive_event(rr::EventPacket& packet, rr::Now now) override;
+  void receive_wire(rr::WirePacket& packet, rr::Now now) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
   void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) override;
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
-  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) override;
+  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet, rr::Now now) override;
   bool is_behind() const override { return is_behind_; }
   void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) override;
   void close_pipe(rr::PipeId id) override;

@@ -66,8 +66,9 @@ class UpstreamClient {
   virtual std::shared_ptr<Upstream> upstream_in_use() const = 0;
   /// Whether the device may ask it by this callback.
   virtual bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const = 0;
-  virtual void receive_event(rr::EventPacket& packet) = 0;
-  virtual void receive_wire(rr::WirePacket& packet) = 0;
+  // What many are sent one after the other: `now`, which it is sent at, is read once for several of them.
+  virtual void receive_event(rr::EventPacket& packet, rr::Now now) = 0;
+  virtual void receive_wire(rr::WirePacket& packet, rr::Now now) = 0;
   virtual void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) = 0;
   /// So many values were replaced by the one that comes next.
   virtual void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) = 0;
@@ -75,7 +76,7 @@ class UpstreamClient {
   virtual void close_wire(const std::string& path, const rr::MemberDefinition& wire) = 0;
   virtual void accept_pipe(rr::PipeId id) = 0;
   virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
-  virtual void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) = 0;
+  virtual void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet, rr::Now now) = 0;
   /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
   /// Upstream::pace() when this has changed.
   virtual bool is_behind() const = 0;

@@ -4,6 +4,7 @@
 
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
+#include "node/driver/clocks.hpp"
 #include "server/upstream/upstream.hpp"
 
 namespace rrgate {
@@ -99,7 +100,8 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
             const auto self = weak.lock();
             if (!self) return;
             rr::EventPacket packet(path, member, arguments);
-            self->for_each_client([&](UpstreamClient& client) { client.receive_event(packet); });
+            const auto now = rr::read_clocks();
+            self->for_each_client([&](UpstreamClient& client) { client.receive_event(packet, now); });
           });
     } else if (member.kind == rr::MemberKind::callback) {
       connection_->on_callback_later(

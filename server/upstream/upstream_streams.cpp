@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 
+#include "node/driver/clocks.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/upstream.hpp"
 
@@ -41,7 +42,7 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
     const auto newest = wire->newest;
     if (!newest || !has_joined(client, key)) return;
     rr::WirePacket packet(path, member, newest->value, newest->time, wire->arrived);
-    client.receive_wire(packet);
+    client.receive_wire(packet, rr::read_clocks());
   } else if (wire->followers.size() == 1) {
     attach_wire(key);
   }
@@ -122,6 +123,7 @@ void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
   }
   if (!wire->outgoing || wire->outgoing->count != wire->count)
     wire->outgoing.emplace(wire->path, wire->member, wire->newest, wire->arrived, wire->count);
+  auto now = rr::read_clocks();
   std::size_t up_to_date = 0;  // in a row
   for (std::size_t sent = 0; sent < clients_a_turn;) {
     auto& followers = wire->followers;  // they may leave while they are sent to
@@ -140,7 +142,8 @@ void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
     up_to_date = 0;
     ++sent;
     if (missed > 0) client->note_conflated(wire->path, wire->member, missed);
-    client->receive_wire(wire->outgoing->packet);
+    now.steady = std::chrono::steady_clock::now();  // a value's age counts up to here
+    client->receive_wire(wire->outgoing->packet, now);
   }
   hand_out_later(wire);
 }
@@ -243,9 +246,10 @@ void Upstream::attach_pipe(PipeNumber number) {
     const auto endpoints = at->second.endpoints;  // they may leave
     const auto left = self->endpoints_left_;
     rr::SharedPipePacket shared(packet);
+    const auto now = rr::read_clocks();
     for (const auto& endpoint : endpoints)
       if (self->endpoints_left_ == left || self->endpoints_.contains(endpoint))
-        endpoint.first->receive_packet(endpoint.second, shared);
+        endpoint.first->receive_packet(endpoint.second, shared, now);
   };
   handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {
     if (const auto self = weak.lock()) self->pass_back_acks(number, numbers);

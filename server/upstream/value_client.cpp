@@ -299,12 +299,12 @@ void ValueClient::call_callback(const std::string& path, const rr::MemberDefinit
   (*handler)(arguments, std::move(answer));
 }
 
-void ValueClient::receive_event(rr::EventPacket& packet) {
+void ValueClient::receive_event(rr::EventPacket& packet, rr::Now) {
   const auto arguments = packet.arguments();
   publish({std::string(packet.path()), packet.member().name}, Sample{0, {}, {arguments.begin(), arguments.end()}});
 }
 
-void ValueClient::receive_wire(rr::WirePacket& packet) {
+void ValueClient::receive_wire(rr::WirePacket& packet, rr::Now) {
   publish({std::string(packet.path()), packet.member().name}, Sample{0, packet.time(), {packet.value()}});
 }
 
@@ -324,7 +324,7 @@ void ValueClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
   if (const auto refused = pipes_.extract(id)) joined(refused.mapped(), error);
 }
 
-void ValueClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
+void ValueClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet, rr::Now) {
   if (const auto found = pipes_.find(id); found != pipes_.end())
     publish(Key(found->second), Sample{0, {}, {packet.value()}});
 }

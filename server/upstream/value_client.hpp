@@ -148,14 +148,14 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
-  void receive_event(rr::EventPacket& packet) override;
-  void receive_wire(rr::WirePacket& packet) override;
+  void receive_event(rr::EventPacket& packet, rr::Now now) override;
+  void receive_wire(rr::WirePacket& packet, rr::Now now) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
   void note_conflated(const std::string&, const rr::MemberDefinition&, std::uint64_t) override {}
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
-  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) override;
+  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet, rr::Now now) override;
   bool is_behind() const override { return false; }
   void acknowledge_packets(rr::PipeId, std::span<const std::uint32_t>) override {}
   void close_pipe(rr::PipeId id) override;

@@ -140,8 +140,9 @@ class HearingClient final : public UpstreamClient {
   std::function<void(const rr::ClientConnection::CallbackReply&)> on_callback;  ///< none: it answers none
   bool can_command = true;
   bool reads_slowly = false;
-  mutable int times_asked = 0;     ///< whether it does
-  std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
+  mutable int times_asked = 0;         ///< whether it does
+  std::vector<rr::TimePoint> told_at;  ///< of events and packets
+  std::vector<std::string> heard;      ///< "wire NAME joined", "released PATH", ...
 
  private:
   std::weak_ptr<const void> life() const override { return life_; }
@@ -152,10 +153,11 @@ class HearingClient final : public UpstreamClient {
     if (on_lease_ended) on_lease_ended();
   }
   bool may_answer(const std::string&, const rr::MemberDefinition&) const override { return on_callback != nullptr; }
-  void receive_event(rr::EventPacket& packet) override {
+  void receive_event(rr::EventPacket& packet, rr::Now now) override {
+    told_at.push_back(now.steady);
     if (on_event) on_event(packet);
   }
-  void receive_wire(rr::WirePacket& packet) override {
+  void receive_wire(rr::WirePacket& packet, rr::Now) override {
     if (on_wire) on_wire(packet);
   }
   void answer_wire(const std::string&, const rr::MemberDefinition& wire, const rr::Result<>& result) override {
@@ -167,7 +169,10 @@ class HearingClient final : public UpstreamClient {
   }
   void accept_pipe(rr::PipeId) override { heard.push_back("pipe accepted"); }
   void refuse_pipe(rr::PipeId, const rr::Error&) override { heard.push_back("pipe refused"); }
-  void receive_packet(rr::PipeId, rr::SharedPipePacket&) override { heard.push_back("packet"); }
+  void receive_packet(rr::PipeId, rr::SharedPipePacket&, rr::Now now) override {
+    told_at.push_back(now.steady);
+    heard.push_back("packet");
+  }
   bool is_behind() const override {
     ++times_asked;
     return reads_slowly;

@@ -68,6 +68,22 @@ TEST_CASE("a device is held back on a pipe by whoever is behind, as soon as it j
   CHECK(bench.run_until([&] { return is_sent = is_sent || send(); }));
 }
 
+TEST_CASE("the clocks are read once for an event or a packet, however many clients hear of it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::vector<std::unique_ptr<HearingClient>> clients;
+  for (int i = 0; i < 20; ++i) {
+    auto& client = *clients.emplace_back(std::make_unique<HearingClient>(bench.upstream));
+    bench.upstream->join_pipe(client, 1, "bench", *bench.upstream->object_type("bench")->find_member("news"));
+  }
+  REQUIRE(bench.run_until([&] { return clients.back()->heard.size() == 1; }));
+  device.service->fire("struck", 1);
+  device.service->pipe("news").broadcast(rr::Value(1));
+  REQUIRE(bench.run_until([&] { return clients.back()->told_at.size() == 2; }));
+  for (const auto& client : clients) CHECK(client->told_at == clients.front()->told_at);
+}
+
 TEST_CASE("wires that were joined anew by a session that was lost at once are joined by the next one") {
   const std::string path = "bench.parts[1]";  // which the device is asked for
   Counting device;
