@@ -53,6 +53,8 @@ test("a recording is played: its panels show its values, the time line goes to o
     const mark = page.getByText("recording", { exact: true });
     await expect(mark).toBeVisible();
     await expect(page.getByRole("heading", { level: 1 })).toHaveText(`replay~${name}`);
+    await expect(page.getByRole("button", { name: "Forward" })).toHaveCount(0); // nothing drives a recording
+    await expect(page.locator(".stop-button, .camera")).toHaveCount(0);
     const x = page.locator('[data-pose="x"]');
     const recorded = async (): Promise<number> =>
       ((await (await fetch(`${gateway.url}api/v1/devices/replay~${name}/Create/state`)).json()) as { x: number }).x;
@@ -60,6 +62,7 @@ test("a recording is played: its panels show its values, the time line goes to o
     const atEnd = await recorded();
     expect(atEnd).toBeGreaterThan(0.5);
     await expect(x).toHaveText(`${atEnd.toFixed(3)} m`);
+    await expect(page.getByText("NotImplementedError")).toHaveCount(0);
     await bar.getByLabel("Time of the recording").fill("2");
     await expect(bar).toContainText("0:02.0 / 0:05.0");
     const then = await recorded();

@@ -4,7 +4,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
-import { devicesOf } from "../gateway/devices";
+import { devicesOf, isReplay } from "../gateway/devices";
 import { makeSafe, safeOf } from "../gateway/safe";
 import { isSignedOut, session } from "../gateway/session";
 import { isEscape, tellStop } from "../robot/control";
@@ -25,10 +25,10 @@ type State =
 
 /**
  * By a call where it is known how and there is a connection that answers, else by what the gateway does when a lease ends; nothing
- * where neither is known.
+ * where neither is known, and for a recording, which does not move.
  */
 export function StopButton({ object, stop, place, safe }: StopButtonProps) {
-  if (!stop && safe.length === 0) return null;
+  if (isReplay(place.device) || (!stop && safe.length === 0)) return null;
   const send: Send = (failed) => {
     if (stop && object) return passOn(stopDevice(object, stop, failed), (cause) => stopWithout(place, safe, cause));
     tellStop();

@@ -7,6 +7,7 @@ import { useStore } from "../app/store";
 import { stopWithout, useSafe } from "../board/stop";
 import { CameraView } from "../camera/camera_view";
 import { RobotChart } from "../chart/robot_chart";
+import { isReplay } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { stopNow } from "../robot/control";
 import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
@@ -45,7 +46,8 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
   // The view that is shown has a stop of its own.
   const latest = useRef<typeof without | null>(null);
   latest.current = shown ? without : null;
-  const model = useMemo(() => new RobotModel(), []);
+  const isRecorded = isReplay(device); // nothing moves it, and what there is now was not there
+  const model = useMemo(() => new RobotModel({ isRecorded }), [isRecorded]);
   const [driveFailure, setDriveFailure] = useState<string | null>(null);
   const { control, last, isOpen } = useControl(reach);
   const driver = useMemo(() => {
@@ -90,7 +92,7 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
     robot.call("reset", []).catch((error: unknown) => setDriveFailure(`reset: ${explain(error)}`));
   };
   return (
-    <div class="robot">
+    <div class={`robot ${isRecorded ? "is-recorded" : ""}`}>
       <section class={`panel chart-panel ${poseComes ? "" : "is-stale"}`} aria-labelledby="chart-title">
         <h2 id="chart-title" class="unseen">
           {t("Chart")}
@@ -99,7 +101,7 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
         {poseAge !== null && <p class="chart-age">{t("Last known, {0}", poseAge)}</p>}
         <div class="chart-foot">
           <PoseLine model={model} live={live} />
-          {remote?.has("reset", "function") && (
+          {!isRecorded && remote?.has("reset", "function") && (
             <button class="button button-quiet" type="button" onClick={() => putBack(remote)}>
               {t("To start")}
             </button>
@@ -107,23 +109,25 @@ export default function RobotPage({ link, list, device, service, shown }: RobotP
           <button class="button button-quiet" type="button" onClick={() => model.clearTrail()}>
             {t("Clear trail")}
           </button>
-          <SongBox robot={remote} />
+          {!isRecorded && <SongBox robot={remote} />}
         </div>
       </section>
-      <div class="robot-side">
-        <DrivePanel
-          driver={driver}
-          control={last}
-          enabled={live && shown && isOpen}
-          shown={shown}
-          unsent={stopUnconnected}
-          lost={state.kind === "lost"}
-          failure={driveFailure}
-          device={device}
-          service={service}
-        />
-        <CameraView list={list} robot={device} shown={shown} />
-      </div>
+      {!isRecorded && (
+        <div class="robot-side">
+          <DrivePanel
+            driver={driver}
+            control={last}
+            enabled={live && shown && isOpen}
+            shown={shown}
+            unsent={stopUnconnected}
+            lost={state.kind === "lost"}
+            failure={driveFailure}
+            device={device}
+            service={service}
+          />
+          <CameraView list={list} robot={device} shown={shown} />
+        </div>
+      )}
       <ValuesPanel model={model} live={live} />
       <BumpLog model={model} />
     </div>

@@ -65,6 +65,7 @@ export class RobotModel {
   /** What fails while reading, shown beside the values; null when all is well. */
   readonly trouble = new Store<string | null>(null);
 
+  readonly #isRecorded: boolean;
   readonly #reckoner = new Reckoner();
   readonly #moved = new Set<() => void>();
   readonly #heard = new Map<Told, number>();
@@ -72,6 +73,11 @@ export class RobotModel {
   #latest: Readings = NO_READINGS;
   #showTimer: ReturnType<typeof setTimeout> | undefined;
   #bumpCount = 0;
+
+  /** `isRecorded`  plays what a robot has sent: it can't be called. */
+  constructor({ isRecorded = false } = {}) {
+    this.#isRecorded = isRecorded;
+  }
 
   /** Runs `moved` whenever the map needs a new picture. */
   onMoved(moved: () => void): () => void {
@@ -178,7 +184,7 @@ export class RobotModel {
   async #followPackets(remote: Remote, signal: AbortSignal): Promise<void> {
     // Counted per client on some robots, one switch for all on others: so it is never stopped from here. The count ends
     // with the connection, and a switch is not ours to turn off.
-    if (remote.has("StartStreaming", "function")) await remote.call("StartStreaming", []);
+    if (!this.#isRecorded && remote.has("StartStreaming", "function")) await remote.call("StartStreaming", []);
     for await (const value of remote.wire("packets", signal)) {
       this.#works("wire packets");
       this.#takePacket(value);
