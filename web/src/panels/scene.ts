@@ -113,7 +113,7 @@ export class Picture {
     this.#chains.clear();
     for (const chain of chains) this.#addChain(chain);
     this.#bodies.clear();
-    this.#bodies.add(...bodies.map((body) => this.#makeBody(body)));
+    for (const body of bodies) this.#bodies.add(this.#makeBody(body));
     this.#showFrames([...chains.flatMap((chain) => chain.at(-1) ?? []), ...frames.map(({ pose }) => pose)]);
     if (poses.length > 0) this.#lookAtFirst();
     this.#redraw();
