@@ -195,6 +195,26 @@ describe("a stop of all agents", () => {
       "arm refuses: stuck",
     );
   });
+
+  it("tells of all devices that may not be safe, also when it is sent again, until they are or agents may go on", async () => {
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    const given: { devices: object[] } = { devices: [] };
+    session.fetch.mockImplementation(() => Promise.resolve(answer(200, { stopped_for: 600, ...given })));
+    await desk.look();
+    await desk.letGoOn();
+    const arm = { device: "arm", refused: "Arm", error: { message: "stuck" } };
+    given.devices = [arm, { device: "base", sent: "Base", unanswered: "not yet" }, { ...arm, device: "lift" }];
+    const all = /^arm refuses: stuck; lift refuses: stuck; .*not answered yet: base$/;
+    await expect(desk.stop(10)).rejects.toThrow(all);
+    given.devices = []; // no agent commands any more
+    await expect(desk.stop(10)).rejects.toThrow(all);
+    given.devices = [{ device: "arm", stopped: "Arm" }];
+    await expect(desk.stop(10)).rejects.toThrow(/^lift refuses/);
+    given.devices = [];
+    await desk.letGoOn();
+    expect(await desk.stop(10)).toBeUndefined();
+  });
 });
 
 describe("asking for access", () => {

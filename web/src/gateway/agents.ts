@@ -52,6 +52,8 @@ export class AgentsDesk {
   readonly trouble = new Store<string | null>(null);
   readonly notices = new ApprovalNotices();
   readonly #session: Pick<Session, "fetch" | "who">;
+  /** Devices of the stop that holds that have not said that they are safe, by name: why one refuses; null: it has not answered. */
+  readonly #unsafe = new Map<string, string | null>();
   #asked = 0;
   #heardAt = Date.now();
 
@@ -95,18 +97,33 @@ export class AgentsDesk {
 
   /**
    * Ends what they do, and lets them do nothing for so long.
-   * @returns in words, which devices have not answered yet that they are safe; nothing: there are none.
-   * @throws (rejects) why they may go on, or why a device may not be safe.
+   * @returns in words, which devices have not answered yet that they are safe, also to a stop before that still holds; nothing: there
+   *   are none.
+   * @throws (rejects) why they may go on, or which devices may not be safe, and why.
    */
   async stop(minutes: number): Promise<string | void> {
+    if (!(this.state.value && this.state.value.stoppedUntil > Date.now())) this.#unsafe.clear();
     const response = await this.#post("stop", { minutes }, STOP_TIMEOUT_MS);
     if (this.state.value) this.state.value = { ...this.state.value, stoppedUntil: Date.now() + minutes * 60_000 };
     void this.look();
-    return tellStopped(await response.json());
+    this.#learnSafe(await response.json());
+    return tellStopped(this.#unsafe);
   }
 
   letGoOn(): Promise<void> {
+    this.#unsafe.clear();
     return this.#send("stop", { minutes: 0 });
+  }
+
+  #learnSafe(answer: unknown): void {
+    const devices: unknown[] = isRecord(answer) && Array.isArray(answer["devices"]) ? answer["devices"] : [];
+    for (const each of devices.filter(isRecord)) {
+      const device = text(each["device"]);
+      const error = each["error"];
+      if (isRecord(error)) this.#unsafe.set(device, text(error["message"]));
+      else if (text(each["unanswered"]) !== "") this.#unsafe.set(device, null);
+      else this.#unsafe.delete(device);
+    }
   }
 
   /** What fails is told as trouble. */
@@ -142,15 +159,12 @@ export class AgentsDesk {
 }
 
 /** See AgentsDesk.stop(). */
-function tellStopped(answer: unknown): string | void {
-  const devices: unknown[] = isRecord(answer) && Array.isArray(answer["devices"]) ? answer["devices"] : [];
-  const unanswered: string[] = [];
-  for (const each of devices.filter(isRecord)) {
-    const error = each["error"];
-    if (isRecord(error)) throw new Error(t("{0} refuses: {1}", text(each["device"]), text(error["message"])));
-    if (text(each["unanswered"]) !== "") unanswered.push(text(each["device"]));
-  }
-  if (unanswered.length > 0) return t("agents are stopped; not answered yet: {0}", unanswered.join(", "));
+function tellStopped(unsafe: ReadonlyMap<string, string | null>): string | void {
+  const silent = [...unsafe].filter(([, why]) => why === null).map(([device]) => device);
+  const refused = [...unsafe].flatMap(([device, why]) => (why === null ? [] : t("{0} refuses: {1}", device, why)));
+  const words = silent.length > 0 ? [t("agents are stopped; not answered yet: {0}", silent.join(", "))] : [];
+  if (refused.length > 0) throw new Error([...refused, ...words].join("; "));
+  return words[0];
 }
 
 export function readAgents(answer: unknown, now = Date.now()): Agents {
