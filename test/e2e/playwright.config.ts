@@ -15,7 +15,7 @@ export default defineConfig({
   testDir: "tests",
   timeout: 60_000,
   expect: { timeout: 15_000 },
-  workers: 2, // a test waits more than it computes
+  workers: 1, // what one test measures is not disturbed by another
   forbidOnly: !!process.env["CI"],
   snapshotPathTemplate: "../../docs/images/page/{arg}{ext}",
   reporter: [
