@@ -5,6 +5,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -19,25 +20,33 @@ namespace rrgate {
 
 namespace {
 
-/// Tells the service manager, as often as it wants, that the loop goes round.
-class Heartbeat {
+/// Works once in each period, until it is stopped.
+class Periodic {
  public:
-  explicit Heartbeat(boost::asio::io_context& io) : timer_(io), period_(watchdog_period()) {}
+  Periodic(boost::asio::io_context& io, std::function<void()> work) : timer_(io), work_(std::move(work)) {}
 
-  void start() {
-    if (!period_) return;
-    notify_service_manager("WATCHDOG=1");
-    timer_.expires_after(*period_);
-    timer_.async_wait([this](const rr::error_code& error) {
-      if (!error) start();
+  void start(std::chrono::milliseconds period) {
+    timer_.expires_after(period);
+    timer_.async_wait([this, period](const rr::error_code& error) {
+      if (error || is_stopped_) return;  // a wait that has ended is not cancelled
+      work_();
+      start(period);
     });
   }
-  void stop() { timer_.cancel(); }
+  void stop() {
+    is_stopped_ = true;
+    timer_.cancel();
+  }
 
  private:
   boost::asio::steady_timer timer_;
-  std::optional<std::chrono::milliseconds> period_;
+  std::function<void()> work_;
+  bool is_stopped_ = false;
 };
+
+void tell_alive() {
+  notify_service_manager("WATCHDOG=1");
+}
 
 /// glibc takes large blocks from the heap once one of their size was freed, and keeps them there: with each thread that
 /// judges a password, the 16 MB of that. Blocks of this size and more are the system's again as soon as they are free;
@@ -54,21 +63,7 @@ void give_large_blocks_back() {
 /// otherwise.
 class FreePages {
  public:
-  explicit FreePages(boost::asio::io_context& io) : timer_(io) {}
-
-  void start() {
-    timer_.expires_after(period);
-    timer_.async_wait([this](const rr::error_code& error) {
-      if (error) return;
-      look();
-      start();
-    });
-  }
-  void stop() { timer_.cancel(); }
-
- private:
   static constexpr std::chrono::seconds period{5};
-  static constexpr std::size_t worth = 16 * 1024 * 1024;  // no trim for what messages alone make come and go
 
   void look() {
 #ifdef __GLIBC__
@@ -80,7 +75,9 @@ class FreePages {
 #endif
   }
 
-  boost::asio::steady_timer timer_;
+ private:
+  static constexpr std::size_t worth = 16 * 1024 * 1024;  // no trim for what messages alone make come and go
+
   std::size_t least_ = std::numeric_limits<std::size_t>::max();  ///< that was free since the last time
 };
 
@@ -94,8 +91,9 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
   boost::asio::io_context io(1);
   Gateway gateway(io, std::move(config));
   ConfigFile file(io, gateway, config_file);
-  Heartbeat heartbeat(io);
-  FreePages free_pages(io);
+  Periodic heartbeat(io, tell_alive);
+  FreePages free_pages;
+  Periodic looks(io, [&] { free_pages.look(); });
   boost::asio::signal_set signals(io, SIGTERM, SIGINT, SIGHUP);
   bool has_stopped = false;
   std::function<void()> wait_for_signal = [&] {
@@ -114,7 +112,7 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
       gateway.stop([&] {
         has_stopped = true;
         heartbeat.stop();
-        free_pages.stop();
+        looks.stop();
         signals.cancel();
       });
     });
@@ -130,8 +128,11 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
     log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
   on_started(io, gateway, *addresses);
   file.watch();
-  heartbeat.start();
-  free_pages.start();
+  if (const auto period = watchdog_period()) {  // as often as the service manager wants
+    tell_alive();
+    heartbeat.start(*period);
+  }
+  looks.start(FreePages::period);
   notify_service_manager("READY=1\nSTATUS=serving");
 
   io.run();  // returns when everything has ended by itself: nothing outlives what it refers to
