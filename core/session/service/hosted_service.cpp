@@ -27,6 +27,10 @@ std::set<std::string, std::less<>> with_imports(const TypeRegistry& types, std::
   return names;
 }
 
+bool can_read(const Version& client, const ServiceDefinition& definition) {
+  return client.is_unspecified() || definition.version.is_unspecified() || definition.version <= client;
+}
+
 }  // namespace
 
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
@@ -78,10 +82,7 @@ Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std
 }
 
 const EntityDefinition* HostedService::type_for_client(const EntityDefinition& type, const Version& client) const {
-  const auto is_known = [&](const EntityDefinition& candidate) {
-    const auto& needed = definition_of(candidate).version;
-    return client.is_unspecified() || needed.is_unspecified() || needed <= client;
-  };
+  const auto is_known = [&](const EntityDefinition& candidate) { return can_read(client, definition_of(candidate)); };
   if (is_known(type)) return &type;
   for (const auto& base : type.implements)
     if (const auto* candidate = types_->find_entity(base.qualified_name); candidate && is_known(*candidate))
@@ -93,8 +94,18 @@ const ServiceDefinition& HostedService::definition_of(const EntityDefinition& ty
   return *types_->find_service(split_qualified(type.qualified_name).service);
 }
 
-std::vector<const ServiceDefinition*> HostedService::definitions_for_client(const EntityDefinition& root) const {
-  auto open = extra_imports_;
+std::vector<std::string_view> HostedService::extra_imports_for_client(const Version& client) const {
+  std::vector<std::string_view> names;
+  for (const auto& name : extra_imports_)
+    if (const auto* definition = types_->find_service(name); definition && can_read(client, *definition))
+      names.push_back(definition->name);
+  return names;
+}
+
+std::vector<const ServiceDefinition*> HostedService::definitions_for_client(const EntityDefinition& root,
+                                                                            const Version& client) const {
+  const auto extra = extra_imports_for_client(client);
+  std::vector<std::string> open(extra.begin(), extra.end());
   open.push_back(definition_of(root).name);
   std::vector<const ServiceDefinition*> definitions;
   for (const auto& name : with_imports(*types_, std::move(open))) definitions.push_back(types_->find_service(name));

@@ -69,7 +69,6 @@ class HostedService {
   const std::string& root_type_name() const { return root_->type_name(); }
   /// A MapString of numbers and texts.
   const Value& attributes() const { return attributes_; }
-  const std::vector<std::string>& extra_imports() const { return extra_imports_; }
   /// Who may do what. Another authenticator holds for the next login, the rest is to be set before clients come.
   const SecurityPolicy& policy() const { return policy_; }
   void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
@@ -86,9 +85,12 @@ class HostedService {
   const EntityDefinition* type_for_client(const EntityDefinition& type, const Version& client) const;
   /// The one that holds `type`.
   const ServiceDefinition& definition_of(const EntityDefinition& type) const;
-  /// What a client needs that sees the root as `root`: its definition, the extra imports and all that these import; in
+  /// The extra imports that a client of this level can read.
+  std::vector<std::string_view> extra_imports_for_client(const Version& client) const;
+  /// What a client needs that sees the root as `root`: its definition, its extra imports and all that these import; in
   /// order of names.
-  std::vector<const ServiceDefinition*> definitions_for_client(const EntityDefinition& root) const;
+  std::vector<const ServiceDefinition*> definitions_for_client(const EntityDefinition& root,
+                                                               const Version& client) const;
 
   struct Found {
     std::shared_ptr<ServiceObject> object;

@@ -230,6 +230,7 @@ class ServiceSession {
     // connect_client_combined
     NodeIdentity client;
     std::uint32_t client_endpoint = 0;
+    Version client_version = {};
     const EntityDefinition* type_for_client = nullptr;
     bool wants_definitions = true;
     std::optional<std::string> known_tag =

@@ -204,8 +204,8 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   const auto* root = service->type_for_client(service->root_type(), *version);
   if (!root) return service_not_found();
   if (auto packed = write_attributes("attributes", *service); !packed) return packed;
-  if (!service->extra_imports().empty())
-    add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
+  if (const auto extra = service->extra_imports_for_client(*version); !extra.empty())
+    add_text_list(outgoing_, "extraimports", extra);
   keep_types(*service);
   outgoing_.add_text("servicedef", service->definition_of(*root).text);
   return {};
@@ -263,6 +263,7 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   request.service = service;
   request.client = {message.header.sender_node_id, std::string(message.header.sender_node_name)};
   request.client_endpoint = message.header.sender_endpoint;
+  request.client_version = *version;
   request.type_for_client = type;
   const auto* flag = find_text(message, entry, "returnservicedefs");
   const auto wish = flag ? to_lower(trim(flag->text())) : std::string();
@@ -279,6 +280,7 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   if (auto begun = begin_login(message, entry, service, now); !begun) return begun;
   login_->client = std::move(request.client);
   login_->client_endpoint = request.client_endpoint;
+  login_->client_version = request.client_version;
   login_->type_for_client = request.type_for_client;
   login_->wants_definitions = request.wants_definitions;
   login_->known_tag = std::move(request.known_tag);
@@ -295,7 +297,7 @@ Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional
   add_implements(outgoing_, *request.type_for_client);
   if (request.wants_definitions) {
     std::vector<std::string_view> texts;
-    for (const auto* definition : service->definitions_for_client(*request.type_for_client))
+    for (const auto* definition : service->definitions_for_client(*request.type_for_client, request.client_version))
       texts.push_back(definition->text);
     keep_types(*service);
     if (!write_tag(outgoing_, request.known_tag, texts)) add_text_list(outgoing_, "servicedefs", texts);

@@ -117,6 +117,14 @@ TEST_CASE("what the root's definition does not import is an extra import, which 
         Texts{level_definitions[0], level_definitions[1], unit, value});
 }
 
+TEST_CASE("clients of an older level get those extra imports that they can read") {
+  const std::string unit = "service x.unit\nstdver 0.10\nstruct Unit\nfield string name\nend\n";
+  const std::string value = "service x.value\nstdver 0.9\nstruct Value\nfield string name\nend\n";
+  LeveledClient client("0.9", {level_definitions[0], level_definitions[1], unit, value});
+  CHECK(client.ask(EntryType::get_service_desc, "top", "extraimports") == Texts{"x.value"});
+  CHECK(client.ask(EntryType::connect_client_combined, "top", "servicedefs") == Texts{level_definitions[0], value});
+}
+
 TEST_CASE("a service's attributes are told by the path of any of its objects") {
   LeveledClient client("1.2.8");
   CHECK(client.ask(EntryType::get_service_attributes, "top", "return").empty());
