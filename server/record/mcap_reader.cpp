@@ -89,10 +89,10 @@ rr::Result<McapReader> McapReader::open(const std::string& file, const std::stri
                           file + ": can't be read: " + std::generic_category().message(why));
   }
   magic.resize(static_cast<std::size_t>(out.file_.gcount()));
-  if (magic != mcap_magic)
+  if (!mcap_magic.starts_with(magic))
     return malformed(file + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));
   out.size_ = static_cast<std::uint64_t>(end);
-  out.at_ = mcap_magic.size();
+  out.at_ = magic.size();
   return out;
 }
 

@@ -23,7 +23,8 @@ struct McapRecord {
 /// system_resource_error.
 class McapReader {
  public:
-  /// `file`  as errors name it: in `folder`, or a path where that is empty.
+  /// `file`  as errors name it: in `folder`, or a path where that is empty. One that ends within what all begin with is
+  /// cut.
   static rr::Result<McapReader> open(const std::string& file, const std::string& folder = {});
 
   /// The next record of the data section; nullopt at its end. Records that hold neither data nor names have no content.

@@ -61,6 +61,11 @@ Recording::Recording(McapReader reader, std::string folder)
 
 rr::Result<Recording> Recording::open(const std::string& file, const std::stop_token& unwanted,
                                       const std::string& folder) {
+  return open(std::vector<std::string>{file}, unwanted, folder);
+}
+
+rr::Result<Recording> Recording::read_file(const std::string& file, const std::stop_token& unwanted,
+                                           const std::string& folder) {
   auto reader = McapReader::open(file, folder);
   if (!reader) return reader.error();
   Recording out(std::move(*reader), folder);
@@ -72,7 +77,8 @@ rr::Result<Recording> Recording::open(const std::string& file, const std::stop_t
     if (!*record) break;
     if (auto taken = out.take(**record); !taken) return out.reader_->error_in(**record, taken.error().message);
   }
-  if (out.services_.empty())
+  out.cut_ = out.reader_->cut();
+  if (out.services_.empty() && out.cut_.empty())
     return bad_recording(file + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
                          "; was it recorded by rrgate?");
   for (const auto& [channel, member] : out.members_) {
@@ -81,21 +87,27 @@ rr::Result<Recording> Recording::open(const std::string& file, const std::stop_t
       return bad_recording(file + ": channel " + rr::quote(member.topic) + " is of service " +
                            rr::quote(member.service) + ", which the file does not hold");
   }
-  out.cut_ = out.reader_->cut();
   return out;
 }
 
 rr::Result<Recording> Recording::open(const std::vector<std::string>& files, const std::stop_token& unwanted,
                                       const std::string& folder) {
-  if (files.size() == 1) return open(files.front(), unwanted, folder);
   std::vector<Recording> parts;
+  std::string cut;  // those that hold nothing
   for (const auto& file : files) {
-    auto part = open(file, unwanted, folder);
+    auto part = read_file(file, unwanted, folder);
     if (!part) return part.error();
-    part->reader_.reset();
-    if (!part->cut_.empty()) part->cut_ = file + " " + part->cut_;
+    if (files.size() > 1) {
+      part->reader_.reset();
+      if (!part->cut_.empty()) part->cut_ = file + " " + part->cut_;
+    }
+    if (part->services_.empty()) {
+      cut += (cut.empty() ? "" : "; ") + part->cut_;
+      continue;
+    }
     parts.push_back(std::move(*part));
   }
+  if (parts.empty()) return bad_recording(files.front() + ": holds no service: " + cut);
   const auto is_before = [](const Recording& a, const Recording& b) {  // those without a message are the last
     return a.message_count_ != 0 && (b.message_count_ == 0 || a.begin_ < b.begin_);
   };
@@ -103,6 +115,7 @@ rr::Result<Recording> Recording::open(const std::vector<std::string>& files, con
   auto out = std::move(parts.front());
   for (std::size_t i = 1; i < parts.size(); ++i)
     if (auto added = out.add(std::move(parts[i])); !added) return added.error();
+  if (!cut.empty()) out.cut_ += (out.cut_.empty() ? "" : "; ") + cut;
   return out;
 }
 
@@ -181,6 +194,7 @@ std::vector<std::string> Recording::files() const {
 std::string Recording::name() const {
   return files_.size() == 1 ? files_.front().name : files_.front().name + " to " + files_.back().name;
 }
+
 rr::Result<> Recording::take(const McapRecord& record) {
   switch (record.opcode) {
     case McapOpcode::channel:

@@ -44,6 +44,7 @@ class Recording {
   static rr::Result<Recording> open(const std::string& file, const std::stop_token& unwanted = {},
                                     const std::string& folder = {});
   /// The same of several, one at least, as one time line: in the order of their first messages, however they are given.
+  /// Those that were cut before their first service hold nothing: they are named in cut(), and one has to be left.
   /// Errors also   data_serialization_error: files whose times overlap, or that know different services by one label.
   static rr::Result<Recording> open(const std::vector<std::string>& files, const std::stop_token& unwanted = {},
                                     const std::string& folder = {});
@@ -87,6 +88,9 @@ class Recording {
     }
   };
   Recording(McapReader reader, std::string folder);
+  /// Without a service where it was cut before the first.
+  static rr::Result<Recording> read_file(const std::string& file, const std::stop_token& unwanted,
+                                         const std::string& folder);
   /// What was recorded later.
   rr::Result<> add(Recording later);
   rr::Result<> add_service(RecordedService later);

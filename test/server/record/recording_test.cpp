@@ -256,6 +256,31 @@ TEST_CASE("files that are of no one recording are refused, and those that were c
   CHECK(open({"d.mcap", "a.mcap"}).value().cut().starts_with("a.mcap ends at byte "));
 }
 
+TEST_CASE("a file that was cut before its first service is left out of its recording, and named") {
+  const test::Folder folder;
+  Recorded robot;
+  auto writer = robot.write(folder.path("a.mcap"));
+  REQUIRE(writer.write(robot.add(writer, "pose"), value(1), {}, {1, 0}));
+  REQUIRE(writer.close());
+  const auto whole = folder.read("a.mcap");
+  const auto within_service = whole.find("robotraconteur.service");
+  REQUIRE(within_service != std::string::npos);
+  const auto open = [&](const std::vector<std::string>& files) { return Recording::open(files, {}, folder.path("")); };
+  for (std::size_t size = 0; size <= within_service; ++size) {
+    folder.write("b.mcap", whole.substr(0, size));
+    const auto recording = open({"b.mcap", "a.mcap"});
+    REQUIRE(recording.has_value());
+    REQUIRE(recording->cut().starts_with("b.mcap ends at byte " + std::to_string(size)));
+    REQUIRE(recording->files() == std::vector<std::string>{"a.mcap"});
+    REQUIRE(recording->message_count() == 1);
+    const auto alone = open({"b.mcap"});
+    REQUIRE_FALSE(alone.has_value());
+    REQUIRE(alone.error().message.starts_with("b.mcap: holds no service: ends at byte " + std::to_string(size)));
+  }
+  folder.write("b.mcap", "no recording");
+  CHECK(open({"a.mcap", "b.mcap"}).error().message.starts_with("b.mcap: is no MCAP file"));
+}
+
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {
   const Recorded robot;
   const auto pose = schema_of(robot, "pose");
