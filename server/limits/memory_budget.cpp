@@ -56,11 +56,15 @@ MemoryBudget::Charge::~Charge() {
   hold(0);
 }
 
-bool MemoryBudget::Charge::has_room(std::size_t more) const {
-  auto& state = *account_->state;
+std::size_t MemoryBudget::Charge::room() const {
+  const auto& state = *account_->state;
   const auto left = state.total - std::min(state.total, state.used);
-  if (more <= left && account_->bytes + more <= left - more) return true;
-  ++state.refusals;
+  return (left - std::min(left, account_->bytes)) / 2;
+}
+
+bool MemoryBudget::Charge::has_room(std::size_t more) const {
+  if (more <= room()) return true;
+  ++account_->state->refusals;
   return false;
 }
 

@@ -30,6 +30,8 @@ class MemoryBudget {
     [[nodiscard]] bool resize(std::size_t bytes);
     /// The same for what is there already: counted in any case.
     void hold(std::size_t bytes);
+    /// So many bytes more would go.
+    std::size_t room() const;
     /// Whether so many bytes more would go. Counts as a refusal where not.
     [[nodiscard]] bool has_room(std::size_t more) const;
     std::size_t bytes() const { return bytes_; }

@@ -91,9 +91,11 @@ rr::Result<Recording> Recording::read_file(const std::string& file, const std::s
 }
 
 rr::Result<Recording> Recording::open(const std::vector<std::string>& files, const std::stop_token& unwanted,
-                                      const std::string& folder) {
+                                      const std::string& folder, std::size_t max_memory) {
   std::vector<Recording> parts;
   std::string cut;  // those that hold nothing
+  std::size_t index = 0;
+  std::size_t buffers = 0;
   for (const auto& file : files) {
     auto part = read_file(file, unwanted, folder);
     if (!part) return part.error();
@@ -105,6 +107,12 @@ rr::Result<Recording> Recording::open(const std::vector<std::string>& files, con
       cut += (cut.empty() ? "" : "; ") + part->cut_;
       continue;
     }
+    index += part->index_memory();
+    buffers = std::max(buffers, part->buffer_memory());
+    if (index + buffers > max_memory)
+      return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                            file + ": with it, the recording takes " + std::to_string(index + buffers) +
+                                " bytes of memory, expected " + std::to_string(max_memory) + " at most");
     parts.push_back(std::move(*part));
   }
   if (parts.empty()) return bad_recording(files.front() + ": holds no service: " + cut);
@@ -289,14 +297,21 @@ rr::Result<> Recording::take_chunk(const McapRecord& record) {
 }
 
 std::size_t Recording::memory() const {
+  return index_memory() + buffer_memory();
+}
+
+std::size_t Recording::index_memory() const {
   constexpr std::size_t node_bytes = 64;  // of a map
   std::size_t out = 0;
+  for (const auto& chunk : chunks_) out += sizeof(chunk) + chunk.message_counts.size() * node_bytes;
+  return out;
+}
+
+std::size_t Recording::buffer_memory() const {
   std::size_t largest = 0;
-  for (const auto& chunk : chunks_) {
-    out += sizeof(chunk) + chunk.message_counts.size() * node_bytes;
+  for (const auto& chunk : chunks_)
     largest = std::max(largest, chunk.bytes + static_cast<std::size_t>(chunk.message_count) * sizeof(McapMessage));
-  }
-  return out + 2 * largest;  // the reader has its bytes, and who reads them has
+  return 2 * largest;  // the reader has its bytes, and who reads them has
 }
 
 rr::Result<McapReader*> Recording::reader_of(std::size_t file) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stop_token>
@@ -45,9 +46,12 @@ class Recording {
                                     const std::string& folder = {});
   /// The same of several, one at least, as one time line: in the order of their first messages, however they are given.
   /// Those that were cut before their first service hold nothing: they are named in cut(), and one has to be left.
-  /// Errors also   data_serialization_error: files whose times overlap, or that know different services by one label.
+  /// `max_memory`  see memory(); asked after each file.
+  /// Errors also   data_serialization_error: files whose times overlap, or that know different services by one label;
+  /// out_of_system_resource.
   static rr::Result<Recording> open(const std::vector<std::string>& files, const std::stop_token& unwanted = {},
-                                    const std::string& folder = {});
+                                    const std::string& folder = {},
+                                    std::size_t max_memory = std::numeric_limits<std::size_t>::max());
 
   const std::vector<RecordedService>& services() const { return services_; }
   const std::map<std::uint16_t, RecordedMember>& members() const { return members_; }
@@ -95,6 +99,8 @@ class Recording {
   rr::Result<> add(Recording later);
   rr::Result<> add_service(RecordedService later);
   rr::Result<> add_members(const Recording& later, File& file);
+  std::size_t index_memory() const;
+  std::size_t buffer_memory() const;
   /// One file is open at a time.
   rr::Result<McapReader*> reader_of(std::size_t file);
   rr::Result<> take(const McapRecord& record);

@@ -26,6 +26,8 @@ namespace {
 constexpr std::chrono::seconds file_look_period{1};
 /// For clients to hear that their services end.
 constexpr std::chrono::milliseconds last_words{500};
+/// Of one recording. Four may be opened at once, which is not charged until it is known.
+constexpr std::size_t max_recording_memory = 256u << 20;
 
 rr::Error replay_ended() {
   return rr::make_error(rr::ErrorCode::operation_cancelled, "the recording is not to be played any more");
@@ -41,6 +43,7 @@ struct Replays::Run {
   std::string name;  ///< of the device
   std::string folder;
   std::vector<std::string> files;
+  std::size_t max_memory = 0;
   std::stop_source unwanted;  ///< for what opens it
   asio::io_context io{1};
   asio::steady_timer file_watch;
@@ -70,7 +73,7 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
     log(LogLevel::warning, "recording is played with gaps", {{"device", device}, {"error", problem}});
   };
   try {
-    auto recording = Recording::open(files, unwanted.get_token(), folder);
+    auto recording = Recording::open(files, unwanted.get_token(), folder, max_memory);
     if (!recording) return recording.error();
     bytes = recording->memory();
     return std::make_unique<Replay>(io, std::move(*recording), std::move(how));
@@ -153,6 +156,7 @@ rr::awaitable<rr::Result<>> Replays::play(std::string device, std::string folder
     run->name = device;
     run->folder = folder;
     run->files = std::move(files);
+    run->max_memory = std::min(run->memory.room(), max_recording_memory);
     found = runs_.emplace(device, run).first;
     if (const auto begun = begin(*run); !begun) {
       runs_.erase(found);
@@ -168,9 +172,11 @@ void Replays::note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size
   const auto found = runs_.find(run.name);
   if (found == runs_.end() || found->second.get() != &run) return;  // ended meanwhile
   if (url && !run.memory.resize(bytes))
-    url = rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left to play " +
-                                                                    run.files.front() + ", which takes " +
-                                                                    std::to_string(bytes) + " bytes");
+    url = rr::make_error(rr::ErrorCode::out_of_system_resource,
+                         run.files.front() + ": the recording takes " + std::to_string(bytes) + " bytes");
+  if (!url && url.error().code == rr::ErrorCode::out_of_system_resource)
+    url = rr::make_error(rr::ErrorCode::out_of_system_resource,
+                         "the gateway has no memory left to play " + url.error().message);
   if (!url) {
     log(LogLevel::warning, "recording can't be played",
         {{"device", run.name}, {"folder", run.folder}, {"error", url.error().message}});

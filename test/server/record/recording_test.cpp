@@ -281,6 +281,27 @@ TEST_CASE("a file that was cut before its first service is left out of its recor
   CHECK(open({"a.mcap", "b.mcap"}).error().message.starts_with("b.mcap: is no MCAP file"));
 }
 
+TEST_CASE("no further file of a recording is read once those before take too much memory") {
+  const test::Folder folder;
+  Recorded robot;
+  const auto record = [&](const char* name, int second) {
+    auto writer = robot.write(folder.path(name));
+    REQUIRE(writer.write(robot.add(writer, "pose"), value(second), {}, {second, 0}));
+    REQUIRE(writer.close());
+    return std::string(name);
+  };
+  const std::vector<std::string> files{record("a.mcap", 1), record("b.mcap", 2)};
+  const auto open = [&](const std::vector<std::string>& some, std::size_t memory) {
+    return Recording::open(some, {}, folder.path(""), memory);
+  };
+  const auto both = Recording::open(files, {}, folder.path("")).value().memory();
+  CHECK(open(files, both).has_value());
+  const auto refused = open({files[0], files[1], "none.mcap"}, both - 1);
+  REQUIRE_FALSE(refused.has_value());
+  CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
+  CHECK(refused.error().message.starts_with("b.mcap: with it, the recording takes " + std::to_string(both)));
+}
+
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {
   const Recorded robot;
   const auto pose = schema_of(robot, "pose");

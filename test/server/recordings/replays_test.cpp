@@ -209,6 +209,10 @@ TEST_CASE("replays: one that takes more memory than is left is refused") {
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
   CHECK(refused.error().message.find(" memory left to play " + file) != std::string::npos);
+  const auto several = made.begin("replay~several", {file, "none.mcap"});  // which is not read any more
+  REQUIRE(made.until([&] { return several->has_value(); }));
+  REQUIRE_FALSE(several->value());
+  CHECK(several->value().error().code == rr::ErrorCode::out_of_system_resource);
   CHECK(made.devices.all().empty());
 }
 
