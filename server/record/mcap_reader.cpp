@@ -75,7 +75,7 @@ rr::Result<T> checked(rr::ByteReader& in, T value) {
 
 }  // namespace
 
-rr::Result<McapReader> McapReader::open(const std::string& file, const std::string& folder) {
+rr::Result<McapReader> McapReader::open(const std::string& file, const std::string& folder, std::uint64_t max_size) {
   McapReader out(file);
   errno = 0;
   out.file_.open(std::filesystem::path(folder) / file, std::ios::binary | std::ios::ate);
@@ -91,8 +91,8 @@ rr::Result<McapReader> McapReader::open(const std::string& file, const std::stri
   magic.resize(static_cast<std::size_t>(out.file_.gcount()));
   if (!mcap_magic.starts_with(magic))
     return malformed(file + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));
-  out.size_ = static_cast<std::uint64_t>(end);
-  out.at_ = magic.size();
+  out.size_ = std::min(static_cast<std::uint64_t>(end), max_size);
+  out.at_ = std::min<std::uint64_t>(magic.size(), out.size_);
   return out;
 }
 

@@ -2,7 +2,9 @@
 // Source: MCAP file format specification, https://mcap.dev/spec
 #pragma once
 
+#include <cstdint>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -23,9 +25,10 @@ struct McapRecord {
 /// system_resource_error.
 class McapReader {
  public:
-  /// `file`  as errors name it: in `folder`, or a path where that is empty. One that ends within what all begin with is
-  /// cut.
-  static rr::Result<McapReader> open(const std::string& file, const std::string& folder = {});
+  /// `file`  as errors name it: in `folder`, or a path where that is empty. `max_size`  what lies behind is not read.
+  /// One that ends within what all begin with is cut.
+  static rr::Result<McapReader> open(const std::string& file, const std::string& folder = {},
+                                     std::uint64_t max_size = std::numeric_limits<std::uint64_t>::max());
 
   /// The next record of the data section; nullopt at its end. Records that hold neither data nor names have no content.
   /// The content is borrowed until the next call.

@@ -57,7 +57,10 @@ constexpr std::array recorded_kinds{rr::MemberKind::wire, rr::MemberKind::pipe, 
 }  // namespace
 
 Recording::Recording(McapReader reader, std::string folder)
-    : folder_(std::move(folder)), files_{{reader.file()}}, reader_(std::move(reader)), size_(reader_->size()) {}
+    : folder_(std::move(folder)),
+      files_{{reader.file(), reader.size()}},
+      reader_(std::move(reader)),
+      size_(reader_->size()) {}
 
 rr::Result<Recording> Recording::open(const std::string& file, const std::stop_token& unwanted,
                                       const std::string& folder) {
@@ -316,7 +319,7 @@ std::size_t Recording::buffer_memory() const {
 
 rr::Result<McapReader*> Recording::reader_of(std::size_t file) {
   if (!reader_ || reader_file_ != file) {
-    auto opened = McapReader::open(files_[file].name, folder_);
+    auto opened = McapReader::open(files_[file].name, folder_, files_[file].size);
     if (!opened) return opened.error();
     reader_.emplace(std::move(*opened));
     reader_file_ = file;

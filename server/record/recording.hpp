@@ -84,6 +84,7 @@ class Recording {
  private:
   struct File {
     std::string name;
+    std::uint64_t size = 0;                                ///< when it was read: it may grow
     std::map<std::uint16_t, std::uint16_t> channels = {};  ///< by the file's own; without those that are the same
 
     std::uint16_t channel_of(std::uint16_t own) const {

@@ -302,6 +302,27 @@ TEST_CASE("no further file of a recording is read once those before take too muc
   CHECK(refused.error().message.starts_with("b.mcap: with it, the recording takes " + std::to_string(both)));
 }
 
+TEST_CASE("what is written to a file after its recording was opened is no part of it") {
+  const test::Folder folder;
+  Recorded robot;
+  const auto record = [&](const char* name, int from) {
+    auto writer = robot.write(folder.path(name));
+    const auto pose = robot.add(writer, "pose");
+    for (int i = from; i < from + 10; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+    REQUIRE(writer.close());
+  };
+  record("a.mcap", 0);
+  record("b.mcap", 10);
+  const auto whole = folder.read("b.mcap");
+  const auto last = Recording::open(folder.path("b.mcap")).value().chunks().back();
+  folder.write("b.mcap", whole.substr(0, last.offset + last.bytes - 20));  // within its last message
+  auto recording = Recording::open(std::vector<std::string>{"a.mcap", "b.mcap"}, {}, folder.path("")).value();
+  const auto count = recording.message_count();
+  REQUIRE(count < 20);
+  folder.write("b.mcap", whole);
+  CHECK(documents(recording).size() == count);
+}
+
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {
   const Recorded robot;
   const auto pose = schema_of(robot, "pose");
