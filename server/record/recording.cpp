@@ -4,6 +4,8 @@
 #include <array>
 #include <filesystem>
 #include <limits>
+#include <set>
+#include <system_error>
 #include <tuple>
 
 #include "core/support/node_id.hpp"
@@ -97,9 +99,13 @@ rr::Result<Recording> Recording::open(const std::vector<std::string>& files, con
                                       const std::string& folder, std::size_t max_memory) {
   std::vector<Recording> parts;
   std::string cut;  // those that hold nothing
+  std::set<std::filesystem::path> known;
   std::size_t index = 0;
   std::size_t buffers = 0;
   for (const auto& file : files) {
+    std::error_code missing;
+    auto path = std::filesystem::canonical(std::filesystem::path(folder) / file, missing);
+    if (!missing && !known.insert(std::move(path)).second) return bad_recording(file + ": is given twice");
     auto part = read_file(file, unwanted, folder);
     if (!part) return part.error();
     if (files.size() > 1) {
@@ -120,7 +126,7 @@ rr::Result<Recording> Recording::open(const std::vector<std::string>& files, con
   }
   if (parts.empty()) return bad_recording(files.front() + ": holds no service: " + cut);
   const auto is_before = [](const Recording& a, const Recording& b) {  // those without a message are the last
-    return a.message_count_ != 0 && (b.message_count_ == 0 || a.begin_ < b.begin_);
+    return a.message_count_ != 0 && (b.message_count_ == 0 || std::tie(a.begin_, a.end_) < std::tie(b.begin_, b.end_));
   };
   std::stable_sort(parts.begin(), parts.end(), is_before);
   auto out = std::move(parts.front());

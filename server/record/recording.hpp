@@ -47,8 +47,8 @@ class Recording {
   /// The same of several, one at least, as one time line: in the order of their first messages, however they are given.
   /// Those that were cut before their first service hold nothing: they are named in cut(), and one has to be left.
   /// `max_memory`  see memory(); asked after each file.
-  /// Errors also   data_serialization_error: files whose times overlap, or that know different services by one label;
-  /// out_of_system_resource.
+  /// Errors also   data_serialization_error: files whose times overlap, or that know different services by one label,
+  /// and one that is given twice; out_of_system_resource.
   static rr::Result<Recording> open(const std::vector<std::string>& files, const std::stop_token& unwanted = {},
                                     const std::string& folder = {},
                                     std::size_t max_memory = std::numeric_limits<std::size_t>::max());

@@ -252,6 +252,12 @@ TEST_CASE("files that are of no one recording are refused, and those that were c
   robot.service.type = "com.x.Robot";
   record("d.mcap", 3, 6);  // at the moment when the one before ends
   CHECK(open({"d.mcap", "a.mcap"}).value().message_count() == 4);
+  record("e.mcap", 3, 3);  // all at that moment
+  for (const auto& files : {std::vector<std::string>{"a.mcap", "d.mcap", "e.mcap"}, {"d.mcap", "e.mcap", "a.mcap"}})
+    CHECK(open(files).value().files() == std::vector<std::string>{"a.mcap", "e.mcap", "d.mcap"});
+  std::filesystem::create_symlink(folder.path("e.mcap"), folder.path("link.mcap"));
+  for (const auto* same : {"e.mcap", "./e.mcap", "link.mcap"})
+    CHECK(open({"a.mcap", "e.mcap", same}).error().message == std::string(same) + ": is given twice");
   std::filesystem::resize_file(folder.path("a.mcap"), std::filesystem::file_size(folder.path("a.mcap")) / 2);
   CHECK(open({"d.mcap", "a.mcap"}).value().cut().starts_with("a.mcap ends at byte "));
 }
