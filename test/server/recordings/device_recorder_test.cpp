@@ -36,8 +36,7 @@ end
 )";
 
 struct RecordedRack {
-  std::shared_ptr<rr::Service> service =
-      rr::Service::from_text({definition, later_definition}, "rack", "test.rack.Rack");
+  std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "rack", "test.rack.Rack");
   std::shared_ptr<rr::Object> part;          ///< the newest that was found
   std::string part_type = "test.rack.Part";  ///< empty: there is none
   UpstreamBench bench;
@@ -209,6 +208,9 @@ TEST_CASE("definitions that other clients of the session find do not end a recor
   REQUIRE(rack.records(3, "parts/1/level", send));
   const auto client = rack.client();
   const auto before = client->upstream()->types()->definitions().size();
+  // Like a device that does not tell of all its definitions at once: its clients learn of this one with an object.
+  auto& types = const_cast<rr::TypeRegistry&>(rack.service->types());
+  REQUIRE(types.add({later_definition}, rr::RobdefMode::strict).has_value());
   const auto found = rack.bench.begin(client->find_object("rack.extra"));
   REQUIRE(rack.bench.run_until([&] { return found->has_value(); }));
   REQUIRE(client->upstream()->types()->definitions().size() == before + 1);
