@@ -204,7 +204,8 @@ describe("a stop of all agents", () => {
     await desk.look();
     await desk.letGoOn();
     const arm = { device: "arm", refused: "Arm", error: { message: "stuck" } };
-    given.devices = [arm, { device: "base", sent: "Base", unanswered: "not yet" }, { ...arm, device: "lift" }];
+    const other = { device: "arm", stopped: "Arm.hand" }; // what another object says is not of this one
+    given.devices = [arm, other, { device: "base", sent: "Base", unanswered: "not yet" }, { ...arm, device: "lift" }];
     const all = /^arm refuses: stuck; lift refuses: stuck; .*not answered yet: base$/;
     await expect(desk.stop(10)).rejects.toThrow(all);
     given.devices = []; // no agent commands any more
@@ -212,6 +213,9 @@ describe("a stop of all agents", () => {
     given.devices = [{ device: "arm", stopped: "Arm" }];
     await expect(desk.stop(10)).rejects.toThrow(/^lift refuses/);
     given.devices = [];
+    session.fetch.mockRejectedValueOnce(new TypeError("Failed to fetch"));
+    await desk.letGoOn();
+    await expect(desk.stop(10)).rejects.toThrow(/^lift refuses/);
     await desk.letGoOn();
     expect(await desk.stop(10)).toBeUndefined();
   });

@@ -52,8 +52,8 @@ export class AgentsDesk {
   readonly trouble = new Store<string | null>(null);
   readonly notices = new ApprovalNotices();
   readonly #session: Pick<Session, "fetch" | "who">;
-  /** Devices of the stop that holds that have not said that they are safe, by name: why one refuses; null: it has not answered. */
-  readonly #unsafe = new Map<string, string | null>();
+  /** Objects of the stop that holds whose devices have not said that they are safe. */
+  readonly #unsafe = new Map<string, Unsafe>();
   #asked = 0;
   #heardAt = Date.now();
 
@@ -91,8 +91,8 @@ export class AgentsDesk {
     }
   }
 
-  answer(approval: Approval, answer: Answer): Promise<void> {
-    return this.#send(`approvals/${encodeURIComponent(approval.id)}`, answer);
+  async answer(approval: Approval, answer: Answer): Promise<void> {
+    await this.#send(`approvals/${encodeURIComponent(approval.id)}`, answer);
   }
 
   /**
@@ -110,9 +110,8 @@ export class AgentsDesk {
     return tellStopped(this.#unsafe);
   }
 
-  letGoOn(): Promise<void> {
-    this.#unsafe.clear();
-    return this.#send("stop", { minutes: 0 });
+  async letGoOn(): Promise<void> {
+    if (await this.#send("stop", { minutes: 0 })) this.#unsafe.clear();
   }
 
   #learnSafe(answer: unknown): void {
@@ -120,14 +119,15 @@ export class AgentsDesk {
     for (const each of devices.filter(isRecord)) {
       const device = text(each["device"]);
       const error = each["error"];
-      if (isRecord(error)) this.#unsafe.set(device, text(error["message"]));
-      else if (text(each["unanswered"]) !== "") this.#unsafe.set(device, null);
-      else this.#unsafe.delete(device);
+      const object = `${device}/${text(each["refused"] ?? each["sent"] ?? each["stopped"])}`;
+      if (isRecord(error)) this.#unsafe.set(object, { device, why: text(error["message"]) });
+      else if (text(each["unanswered"]) !== "") this.#unsafe.set(object, { device, why: null });
+      else this.#unsafe.delete(object);
     }
   }
 
-  /** What fails is told as trouble. */
-  async #send(path: string, body: object): Promise<void> {
+  /** What fails is told as trouble. @returns whether it did not. */
+  async #send(path: string, body: object): Promise<boolean> {
     try {
       await this.#post(path, body, TIMEOUT_MS);
       this.trouble.value = null;
@@ -135,6 +135,7 @@ export class AgentsDesk {
       this.trouble.value = (error as Error).message;
     }
     await this.look();
+    return this.trouble.value === null;
   }
 
   /** @throws Error (rejects), for people. */
@@ -158,12 +159,21 @@ export class AgentsDesk {
   }
 }
 
+interface Unsafe {
+  device: string;
+  /** null: it has not answered. */
+  why: string | null;
+}
+
 /** See AgentsDesk.stop(). */
-function tellStopped(unsafe: ReadonlyMap<string, string | null>): string | void {
-  const silent = [...unsafe].filter(([, why]) => why === null).map(([device]) => device);
-  const refused = [...unsafe].flatMap(([device, why]) => (why === null ? [] : t("{0} refuses: {1}", device, why)));
-  const words = silent.length > 0 ? [t("agents are stopped; not answered yet: {0}", silent.join(", "))] : [];
-  if (refused.length > 0) throw new Error([...refused, ...words].join("; "));
+function tellStopped(unsafe: ReadonlyMap<string, Unsafe>): string | void {
+  const silent = new Set<string>();
+  const refused = new Set<string>();
+  for (const { device, why } of unsafe.values())
+    if (why === null) silent.add(device);
+    else refused.add(t("{0} refuses: {1}", device, why));
+  const words = silent.size > 0 ? [t("agents are stopped; not answered yet: {0}", [...silent].join(", "))] : [];
+  if (refused.size > 0) throw new Error([...refused, ...words].join("; "));
   return words[0];
 }
 
