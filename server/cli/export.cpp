@@ -143,6 +143,8 @@ int run_export(const ExportOptions& options) {
   }
   auto recording = Recording::open(options.files);
   if (!recording) return report_failure("export", recording.error().message);
+  if (!recording->cut().empty())
+    std::cerr << "rrgate export: " << recording->name() << " was cut: " << recording->cut() << "\n";
   const auto* member = find_member(*recording, options.member);
   if (!member)
     return usage_error(

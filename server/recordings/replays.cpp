@@ -26,8 +26,6 @@ namespace {
 constexpr std::chrono::seconds file_look_period{1};
 /// For clients to hear that their services end.
 constexpr std::chrono::milliseconds last_words{500};
-/// Of one recording. Four may be opened at once, which is not charged until it is known.
-constexpr std::size_t max_recording_memory = 256u << 20;
 
 rr::Error replay_ended() {
   return rr::make_error(rr::ErrorCode::operation_cancelled, "the recording is not to be played any more");
@@ -75,7 +73,9 @@ rr::Result<std::unique_ptr<Replay>> Replays::Run::open(std::size_t& bytes) {
   try {
     auto recording = Recording::open(files, unwanted.get_token(), folder, max_memory);
     if (!recording) return recording.error();
+    if (!recording->cut().empty()) how.report(recording->cut());
     bytes = recording->memory();
+    files = recording->files();
     return std::make_unique<Replay>(io, std::move(*recording), std::move(how));
   } catch (const std::exception& problem) {
     return rr::make_error(rr::ErrorCode::data_serialization_error, problem.what());
@@ -156,7 +156,7 @@ rr::awaitable<rr::Result<>> Replays::play(std::string device, std::string folder
     run->name = device;
     run->folder = folder;
     run->files = std::move(files);
-    run->max_memory = std::min(run->memory.room(), max_recording_memory);
+    run->max_memory = run->memory.room();  // charged once it is known
     found = runs_.emplace(device, run).first;
     if (const auto begun = begin(*run); !begun) {
       runs_.erase(found);
@@ -174,9 +174,11 @@ void Replays::note_opened(Run& run, rr::Result<rr::ConnectionUrl> url, std::size
   if (url && !run.memory.resize(bytes))
     url = rr::make_error(rr::ErrorCode::out_of_system_resource,
                          run.files.front() + ": the recording takes " + std::to_string(bytes) + " bytes");
-  if (!url && url.error().code == rr::ErrorCode::out_of_system_resource)
+  if (!url && url.error().code == rr::ErrorCode::out_of_system_resource) {
+    if (bytes == 0) (void)run.memory.has_room(run.max_memory + 1);  // counts it
     url = rr::make_error(rr::ErrorCode::out_of_system_resource,
                          "the gateway has no memory left to play " + url.error().message);
+  }
   if (!url) {
     log(LogLevel::warning, "recording can't be played",
         {{"device", run.name}, {"folder", run.folder}, {"error", url.error().message}});

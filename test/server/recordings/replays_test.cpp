@@ -23,10 +23,11 @@ struct Played {
   test::Folder folder;
   Config config = {};
   DeviceRegistry devices{io.get_executor(), config};
+  MemoryBudget budget;
   std::unique_ptr<Replays> replays;
 
   explicit Played(std::size_t memory = 10'000'000)
-      : replays(std::make_unique<Replays>(io.get_executor(), devices, MemoryBudget(memory).charge(""))) {}
+      : budget(memory), replays(std::make_unique<Replays>(io.get_executor(), devices, budget.charge(""))) {}
   ~Played() {
     if (replays) replays->stop();
     devices.stop();
@@ -185,6 +186,21 @@ TEST_CASE("replays: several files of a recording are one device, which ends when
   CHECK(made.replays->list().empty());
 }
 
+TEST_CASE("replays: a file that was cut before its first service is not played, and may go") {
+  Played made;
+  const auto first = made.write(1);
+  const auto recording = recording_of_file(first);
+  const auto cut = recording + "-2.mcap";
+  made.folder.write(cut, "");
+  const auto outcome = made.begin(replay_of(recording), {first, cut});
+  REQUIRE(made.until([&] { return outcome->has_value(); }));
+  REQUIRE(**outcome);
+  std::filesystem::remove(made.folder.path(cut));
+  const auto later = std::chrono::steady_clock::now() + std::chrono::seconds(2);  // than the next look at the files
+  made.until([&] { return std::chrono::steady_clock::now() > later; });
+  CHECK(made.replays->is_playing(replay_of(recording)));
+}
+
 TEST_CASE("replays: a file that can't be played says why, and is no device") {
   Played made;
   const std::string damaged = "arm.Robot.20261121T083000123Z.mcap";
@@ -209,6 +225,7 @@ TEST_CASE("replays: one that takes more memory than is left is refused") {
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == rr::ErrorCode::out_of_system_resource);
   CHECK(refused.error().message.find(" memory left to play " + file) != std::string::npos);
+  CHECK(made.budget.refusals() == 1);
   const auto several = made.begin("replay~several", {file, "none.mcap"});  // which is not read any more
   REQUIRE(made.until([&] { return several->has_value(); }));
   REQUIRE_FALSE(several->value());
