@@ -104,6 +104,7 @@ struct HardwareWatch::State {
   DriverRoots roots;
   WatchTimer timer;
   asio::cancellation_signal stop_looking = {};
+  bool is_looking = false;
   std::optional<asio::posix::stream_descriptor> news = {};
   std::vector<std::string> problems = {};  ///< of the look before
 };
@@ -122,7 +123,8 @@ HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_n
 
 HardwareWatch::~HardwareWatch() {
   state_->timer.stop();
-  state_->stop_looking.emit(asio::cancellation_type::terminal);
+  // What the watch itself calls ends it without that: Asio could not tell a coroutine that never waited.
+  if (state_->is_looking) state_->stop_looking.emit(asio::cancellation_type::terminal);
   error_code ignored;
   if (state_->news) state_->news->close(ignored);
 }
@@ -130,7 +132,9 @@ HardwareWatch::~HardwareWatch() {
 awaitable<void> HardwareWatch::run(std::shared_ptr<State> state) {
   while (!state->timer.is_stopped()) {
     state->timer.begin_look();
+    state->is_looking = true;
     auto found = co_await list_hardware_nodes(state->roots);
+    state->is_looking = false;
     if (state->timer.is_stopped()) break;
     state->on_nodes(found.nodes);
     const auto before = std::exchange(state->problems, std::move(found.problems));
