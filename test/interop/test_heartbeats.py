@@ -4,7 +4,7 @@ Quick for our clients; RR_LONG_TESTS=1 also waits for the protocol's own periods
 """
 import json
 import os
-import select
+import selectors
 import socket
 import sys
 import threading
@@ -17,6 +17,13 @@ from directions import PEERS
 from processes import BUILD, Background
 
 IDLE = [{"listen": "cleared"}, *[{"events": "cleared", "count": 1}] * 5]  # waits 10 s for each
+
+
+def readable(sockets, seconds=None):
+    with selectors.DefaultSelector() as selector:  # select() knows no descriptors above 1023
+        for each in sockets:
+            selector.register(each, selectors.EVENT_READ)
+        return [key.fileobj for key, _ in selector.select(seconds)]
 
 
 class Line:
@@ -34,13 +41,13 @@ class Line:
         client, _ = self._listener.accept()
         service = socket.create_connection(("127.0.0.1", port))
         other = {client: service, service: client}
-        while ready := select.select(list(other), [], [], 1)[0]:
+        while ready := readable(other, 1):
             for side in ready:
                 other[side].sendall(side.recv(65536))
         last_word = time.monotonic() - 1
         names = {client: "client", service: "service"}
         while names:
-            for side in select.select(list(names), [], [])[0]:
+            for side in readable(names):
                 try:
                     data = side.recv(65536)
                 except ConnectionError:
