@@ -154,8 +154,12 @@ for (const [size, viewport] of Object.entries({
       await expect(page.locator('[data-link="online"]')).toBeVisible();
       const stop = page.getByRole("button", { name: "Stop", exact: true });
       await expect(stop, view).toBeInViewport({ ratio: 1 });
-      await page.evaluate(() => window.scrollTo(0, document.documentElement.scrollHeight));
-      await expect.poll(() => page.evaluate(() => scrollY), { message: view }).toBeGreaterThan(0);
+      const scrollDown = (): number => {
+        window.scrollTo(0, document.documentElement.scrollHeight);
+        return scrollY;
+      };
+      // Again while the view is still loaded, and low.
+      await expect.poll(() => page.evaluate(scrollDown), { message: view }).toBeGreaterThan(0);
       await expect(stop, view).toBeInViewport({ ratio: 1 });
       expect(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), view).toBeLessThanOrEqual(0);
       await stop.click(); // nothing lies over it
