@@ -23,9 +23,8 @@ export default defineConfig({
     ["./assertions_reporter.ts"],
     ...(process.env["PLAYWRIGHT_JUNIT_OUTPUT_FILE"] ? [["junit"] as const] : []),
   ],
-  // Without a trace, which costs a tenth of the time: `--trace retain-on-failure` has one.
   // A page that its service worker takes over makes requests past page.route(), from some moment on.
-  use: { launchOptions: chromium, serviceWorkers: "block" },
+  use: { trace: "retain-on-failure", launchOptions: chromium, serviceWorkers: "block" },
   projects: [
     { name: "desktop", use: { viewport: { width: 1280, height: 800 } }, testIgnore: "phone.spec.ts" },
     { name: "phone", use: phone, testMatch: "phone.spec.ts" },

@@ -5,7 +5,6 @@ import shutil
 import socket
 import sys
 import tempfile
-from collections import Counter
 
 import pytest
 
@@ -98,10 +97,6 @@ def pytest_collection_modifyitems(config, items):
     items[:] = filter(is_known, items)
     for item in items:
         item.add_marker(pytest.mark.xdist_group(group_of(item)))
-    # Groups that take long begin first, then those of many tests: at the end no worker waits long for another.
-    long = {group_of(item) for item in items if item.get_closest_marker("long")}
-    sizes = Counter(map(group_of, items))
-    items.sort(key=lambda item: (group_of(item) not in long, -sizes[group_of(item)]))
 
 
 def group_of(item):

@@ -8,7 +8,6 @@ import chaos
 import pytest
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_lost_or_doubled_while_everything_breaks(tmp_path, seed):
     site = chaos.Site(tmp_path)

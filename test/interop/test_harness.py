@@ -1,10 +1,7 @@
 """The helpers of these tests: what they are for is seen, and what they watch does not fail unseen."""
 import ast
 import pathlib
-import re
 import socket
-import subprocess
-import sys
 
 import pytest
 
@@ -56,18 +53,3 @@ def test_no_test_imports_another_one():
                 [node.module] if isinstance(node, ast.ImportFrom) else []
             found += [f"{path.name}: {name}" for name in names if name.startswith("test_")]
     assert found == []
-
-
-def test_the_tests_of_a_group_run_in_one_process(tmp_path):
-    """Else each process starts the device and the gateway of each module, and groups that need the network for themselves share it."""
-    (tmp_path / "test_groups.py").write_text("""
-import pytest
-@pytest.mark.parametrize("number", range(8))
-@pytest.mark.parametrize("group", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in ("one", "other")])
-def test_of(group, number):
-    pass
-""")
-    said = subprocess.run([sys.executable, "-m", "pytest", "-v", "-n", "2", "--dist", "loadgroup", "--rootdir", tmp_path, tmp_path],
-                          capture_output=True, text=True, cwd=tmp_path, timeout=60, check=True).stdout
-    ran = re.findall(r"\[(gw\d)\] .*PASSED.*::test_of\[(\w+)-\d\]", said)
-    assert len(ran) == 16 and len(set(ran)) == 2, said
