@@ -117,8 +117,9 @@ HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_n
     state_->news.emplace(executor, number);
     asio::co_spawn(executor, listen(state_), asio::detached);
   }
-  asio::co_spawn(executor, run(state_),
-                 asio::bind_cancellation_slot(state_->stop_looking.slot(), [state = state_](std::exception_ptr) {}));
+  asio::co_spawn(
+      executor, run(state_),
+      asio::bind_cancellation_slot(state_->stop_looking.slot(), [state = state_](const std::exception_ptr&) {}));
 }
 
 HardwareWatch::~HardwareWatch() {

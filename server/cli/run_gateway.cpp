@@ -54,8 +54,10 @@ void tell_alive() {
 void give_large_blocks_back() {
 #ifdef __GLIBC__
   constexpr int large = 8 * 1024 * 1024;
+  // NOLINTBEGIN(concurrency-mt-unsafe): there are no other threads yet
   mallopt(M_MMAP_THRESHOLD, large);
   mallopt(M_TRIM_THRESHOLD, 2 * large);
+  // NOLINTEND(concurrency-mt-unsafe)
 #endif
 }
 
